@@ -1,0 +1,20 @@
+"""The errors that brrt raises on purpose."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BrrtError(Exception):
+    """Bad input or an unusable file; the message is one line that names the remedy."""
+
+
+class RecordingError(BrrtError):
+    """A recording cannot be written, or cannot be read in whole."""
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> BrrtError:
+    """Return the error for `name`, which is none of the `known` names of a `what`."""
+    names = sorted(known)
+    near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]!r}?" if near else "there is: " + ", ".join(names)
+    return BrrtError(f"unknown {what} {name!r}; {hint}")

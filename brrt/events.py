@@ -1,0 +1,196 @@
+"""The vocabulary: what a planner can say, and how a log of it is held.
+
+A new kind of event is added here alone: give it a number in `Kind` and its fields in `FIELDS`.
+Writers, readers, views and comparisons derive their layouts from that declaration.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum, unique
+from functools import cache
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Table = NDArray[np.void]
+"""Events of one kind: a structured array with `seq`, `t`, `iteration` and the kind's fields."""
+
+
+@unique
+class Kind(IntEnum):
+    """What happened."""
+
+    PHASE = 0
+    SAMPLE = 1
+    REJECT = 2
+    EDGE = 3
+    PATH = 4
+    SHORTCUT = 5
+
+    @property
+    def label(self) -> str:
+        """The name in files and in JSON."""
+        return self.name.lower()
+
+
+@unique
+class Phase(IntEnum):
+    """A part of a run."""
+
+    PLAN = 0
+    SMOOTH = 1
+
+
+@unique
+class Status(IntEnum):
+    """How a phase stands: it begins, or how it ended."""
+
+    BEGIN = 0
+    SOLVED = 1
+    ITERATION_LIMIT = 2
+    TIME_LIMIT = 3
+    INTERRUPTED = 4
+    DONE = 5
+
+
+@unique
+class Source(IntEnum):
+    """Where a sample came from."""
+
+    UNIFORM = 0
+    GOAL = 1
+
+
+@unique
+class Reason(IntEnum):
+    """Why an extension failed."""
+
+    COLLISION = 0
+    NO_PROGRESS = 1
+    GOAL_BLOCKED = 2
+
+
+@unique
+class Stage(IntEnum):
+    """Which path of the run this is."""
+
+    RAW = 0
+    SMOOTHED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a kind of event.
+
+    `type` is a ROS 2 primitive, `q` (one configuration, float64[dof]) or `q[]` (configurations
+    in a row, of any number). `choices` gives an integer field its names.
+    """
+
+    name: str
+    type: str
+    doc: str
+    choices: type[IntEnum] | None = None
+
+
+_TREE = Field("tree", "uint8", "0 grows from the start")
+_Q = Field("q", "q", "configuration")
+
+FIELDS: Mapping[Kind, tuple[Field, ...]] = {
+    Kind.PHASE: (
+        Field("name", "uint8", "part of the run", Phase),
+        Field("status", "uint8", "begins, or how it ended", Status),
+    ),
+    Kind.SAMPLE: (_TREE, Field("source", "uint8", "where the sample came from", Source), _Q),
+    Kind.REJECT: (
+        _TREE,
+        Field("node", "int32", "node that the extension left from"),
+        Field("reason", "uint8", "why it failed", Reason),
+        Field("q", "q", "configuration that the extension wanted to reach"),
+    ),
+    Kind.EDGE: (
+        _TREE,
+        Field("node", "int32", "node that joined the tree, numbered from 0 in each tree"),
+        Field("parent", "int32", "its parent; -1 for a root"),
+        Field("cost", "float64", "cost-to-come in the robot's metric"),
+        _Q,
+    ),
+    Kind.PATH: (
+        Field("stage", "uint8", "which path of the run", Stage),
+        Field("cost", "float64", "its length in the robot's metric"),
+        Field("waypoints", "q[]", "configurations from start to goal"),
+    ),
+    Kind.SHORTCUT: (
+        Field("i", "int32", "first waypoint of the pair, numbered on the path as it stood"),
+        Field("j", "int32", "second waypoint"),
+        Field("accepted", "bool", "whether the direct motion was free and replaced the detour"),
+        Field("cost", "float64", "cost of the path after the attempt"),
+    ),
+}
+
+
+@cache
+def table_dtype(kind: Kind, dof: int) -> np.dtype[np.void]:
+    """Layout of a table: the three columns that every event has, then the kind's own."""
+    columns: list[tuple[Any, ...]] = [("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")]
+    for field in FIELDS[kind]:
+        if field.type == "q":
+            columns.append((field.name, "<f8", (dof,)))
+        elif field.type == "q[]":
+            columns.append((field.name, "O"))
+        else:
+            columns.append((field.name, np.dtype(field.type)))
+    return np.dtype(columns, align=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Events:
+    """A batch of events, in one table a kind; a whole log is only a longer batch.
+
+    Attributes:
+        dof: Numbers in a configuration.
+        tables: For each kind that occurs, its events in the order of `seq`.
+    """
+
+    dof: int
+    tables: Mapping[Kind, Table]
+
+    def __len__(self) -> int:
+        return sum(map(len, self.tables.values()))
+
+    def __getitem__(self, kind: Kind) -> Table:
+        found = self.tables.get(kind)
+        return np.empty(0, table_dtype(kind, self.dof)) if found is None else found
+
+    @classmethod
+    def concat(cls, dof: int, batches: Iterable["Events"]) -> Self:
+        """Join batches, given in order, into one log."""
+        parts: dict[Kind, list[Table]] = {}
+        for batch in batches:
+            for kind, table in batch.tables.items():
+                parts.setdefault(kind, []).append(table)
+        return cls(dof, {kind: np.concatenate(parts[kind]) for kind in sorted(parts)})
+
+    def until(
+        self, *, seq: int | None = None, t: int | None = None, iteration: int | None = None
+    ) -> "Events":
+        """Return the events up to and including a number, a time (ns) or an iteration.
+
+        All three columns never fall along a log, so each table is cut by bisection.
+        """
+        tables = self.tables
+        for column, last in (("seq", seq), ("t", t), ("iteration", iteration)):
+            if last is not None:
+                tables = {
+                    kind: table[: np.searchsorted(table[column], last, side="right")]
+                    for kind, table in tables.items()
+                }
+        return Events(self.dof, {kind: table for kind, table in tables.items() if len(table)})
+
+    def kinds_in_order(self) -> tuple[int, NDArray[np.uint8]]:
+        """Return the first `seq` and the kind of each event from there on, shape (n,)."""
+        first = min((int(table["seq"][0]) for table in self.tables.values()), default=0)
+        order = np.empty(len(self), np.uint8)
+        for kind, table in self.tables.items():
+            order[table["seq"] - first] = kind
+        return first, order

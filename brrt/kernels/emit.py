@@ -1,0 +1,221 @@
+"""How kernels and Python code say what happens: a buffer of events, drained batch by batch."""
+
+import time
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import FIELDS, Events, Kind, table_dtype
+from brrt.kernels.clock import COMPILED_CLOCK, now_ns
+from brrt.kernels.jit import inlined
+
+INTS = 3
+"""Integer fields that a kind may have; `emit` takes this many."""
+
+_COUNT, _FIRST_SEQ, _LAST_T, _ORIGIN, _TICK = range(5)
+
+
+class Buffer(NamedTuple):
+    """Columns that a kernel writes; which field stands where follows from `events.FIELDS`.
+
+    Attributes:
+        state: Events held, seq of the first, time of the last, the clock's origin, and the ns
+            between two events of a logical clock (0: a real clock); shape (5,), int64.
+        kind: Shape (n,), uint8.
+        t: Time in ns since the origin, shape (n,), int64.
+        iteration: Shape (n,), int64.
+        ints: A kind's integer fields in their order, shape (n, 3), int32.
+        real: A kind's float field, shape (n,).
+        q: Configurations, shape (n, dof).
+    """
+
+    state: NDArray[np.int64]
+    kind: NDArray[np.uint8]
+    t: NDArray[np.int64]
+    iteration: NDArray[np.int64]
+    ints: NDArray[np.int32]
+    real: NDArray[np.float64]
+    q: NDArray[np.float64]
+
+
+@inlined
+def room(buffer: Buffer) -> int:
+    """Events that still fit."""
+    return len(buffer.kind) - buffer.state[_COUNT]
+
+
+@inlined
+def emit(
+    buffer: Buffer,
+    kind: int,
+    iteration: int,
+    i0: int,
+    i1: int,
+    i2: int,
+    real: float,
+    q: NDArray[np.float64],
+    row: int,
+) -> None:
+    """Append an event; the caller saw to it that there is room.
+
+    Args:
+        buffer: Where to.
+        kind: A `Kind`.
+        iteration: The planner's count.
+        i0: The kind's first integer field.
+        i1: Its second, or anything.
+        i2: Its third, or anything.
+        real: Its float field, or anything.
+        q: Configurations, shape (n, dof).
+        row: Which of them is the event's, or any.
+    """
+    state = buffer.state
+    n = state[_COUNT]
+    last = state[_LAST_T]
+    if state[_TICK] > 0:
+        t = (state[_FIRST_SEQ] + n) * state[_TICK]
+    else:
+        t = max(now_ns() - state[_ORIGIN], last + 1)
+    buffer.kind[n] = kind
+    buffer.t[n] = t
+    buffer.iteration[n] = iteration
+    buffer.ints[n, 0] = i0
+    buffer.ints[n, 1] = i1
+    buffer.ints[n, 2] = i2
+    buffer.real[n] = real
+    for k in range(q.shape[1]):
+        buffer.q[n, k] = q[row, k]
+    state[_LAST_T] = t
+    state[_COUNT] = n + 1
+
+
+def _slots(kind: Kind) -> list[tuple[str, str, int]]:
+    """For each field of a kind: its name, the column that holds it, and its place therein."""
+    places, ints = [], 0
+    for field in FIELDS[kind]:
+        if field.type == "q[]":
+            places.append((field.name, "ragged", 0))
+        elif field.type == "q":
+            places.append((field.name, "q", 0))
+        elif field.type.startswith("float"):
+            places.append((field.name, "real", 0))
+        else:
+            places.append((field.name, "ints", ints))
+            ints += 1
+    return places
+
+
+_SLOTS: Mapping[Kind, list[tuple[str, str, int]]] = {kind: _slots(kind) for kind in Kind}
+
+
+class EventLog:
+    """The log that a run writes to: numbers and times every event, and hands them out in batches.
+
+    Kernels write to `buffer` through the compiled `emit`; Python code, and planners from outside,
+    call the method `emit`.
+
+    Args:
+        dof: Numbers in a configuration.
+        capacity: Events that a batch holds at most.
+        logical_clock: Number events 1 us apart instead of asking the clock, so that two runs
+            with one seed give the same bytes.
+    """
+
+    def __init__(self, dof: int, capacity: int = 16384, *, logical_clock: bool = False) -> None:
+        self.dof = dof
+        self.buffer = Buffer(
+            state=np.zeros(5, np.int64),
+            kind=np.empty(capacity, np.uint8),
+            t=np.empty(capacity, np.int64),
+            iteration=np.empty(capacity, np.int64),
+            ints=np.empty((capacity, INTS), np.int32),
+            real=np.empty(capacity, np.float64),
+            q=np.empty((capacity, dof), np.float64),
+        )
+        self.buffer.state[_LAST_T] = -1
+        self.buffer.state[_TICK] = 1000 if logical_clock else 0
+        self.epoch_ns = 0 if logical_clock else time.time_ns()
+        self._origin = time.perf_counter_ns()
+        self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
+        self._ragged: dict[int, NDArray[np.float64]] = {}
+
+    def __len__(self) -> int:
+        return int(self.buffer.state[_COUNT])
+
+    @property
+    def room(self) -> int:
+        """Events that fit before the next `drain`."""
+        return len(self.buffer.kind) - len(self)
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since the log was opened."""
+        return (time.perf_counter_ns() - self._origin) / 1e9
+
+    def emit(self, kind: Kind, iteration: int, **fields: Any) -> None:  # noqa: ANN401
+        """Append an event; the caller saw to it that there is `room`.
+
+        Args:
+            kind: What happened.
+            iteration: The planner's count.
+            fields: Every field that `events.FIELDS` declares for the kind.
+        """
+        buffer, row, ints = self.buffer, len(self), 0
+        self.tick()
+        for name, column, _ in _SLOTS[kind]:
+            value = fields[name]
+            if column == "ragged":
+                self._ragged[row] = np.array(value, np.float64)
+            elif column == "q":
+                buffer.q[row] = value
+            elif column == "real":
+                buffer.real[row] = value
+            else:
+                buffer.ints[row, ints] = value
+                ints += 1
+        buffer.kind[row], buffer.iteration[row] = kind, iteration
+        buffer.t[row] = buffer.state[_LAST_T] = self._time(row)
+        buffer.state[_COUNT] = row + 1
+
+    def _time(self, row: int) -> int:
+        state = self.buffer.state
+        if state[_TICK]:
+            return int((state[_FIRST_SEQ] + row) * state[_TICK])
+        return max(time.perf_counter_ns() - self._origin, int(state[_LAST_T]) + 1)
+
+    def tick(self) -> None:
+        """Tell kernels the time where they cannot read the clock themselves."""
+        state = self.buffer.state
+        if not COMPILED_CLOCK and state[_TICK] == 0:
+            state[_LAST_T] = max(int(state[_LAST_T]), time.perf_counter_ns() - self._origin)
+
+    def drain(self) -> Events:
+        """Hand out the events held so far, and begin anew."""
+        buffer, n = self.buffer, len(self)
+        first = int(buffer.state[_FIRST_SEQ])
+        tables = {}
+        for code in np.flatnonzero(np.bincount(buffer.kind[:n], minlength=len(Kind))):
+            kind = Kind(int(code))
+            rows = np.flatnonzero(buffer.kind[:n] == code)
+            table = np.empty(len(rows), table_dtype(kind, self.dof))
+            table["seq"] = rows + first
+            table["t"] = buffer.t[rows]
+            table["iteration"] = buffer.iteration[rows]
+            for name, column, place in _SLOTS[kind]:
+                if column == "ragged":
+                    for i, row in enumerate(rows):
+                        table[name][i] = self._ragged.pop(int(row))
+                elif column == "ints":
+                    table[name] = buffer.ints[rows, place]
+                elif column == "real":
+                    table[name] = buffer.real[rows]
+                else:
+                    table[name] = buffer.q[rows]
+            tables[kind] = table
+        buffer.state[_FIRST_SEQ] += n
+        buffer.state[_COUNT] = 0
+        return Events(self.dof, tables)
+
+

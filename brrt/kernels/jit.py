@@ -1,0 +1,88 @@
+"""The one place that knows how kernels are compiled, and where the compiled code is kept."""
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+from numba import types
+from platformdirs import user_cache_path
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).parents[1]
+_SOURCES = ("events.py", "kernels", "robots", "planners")
+
+
+def _sources_digest() -> str:
+    """Digest of everything that a kernel is compiled from.
+
+    Numba looks at the time of the calling file alone, so a helper that was edited in another file
+    would go on running as it was.
+    """
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    for name in _SOURCES:
+        place = _PACKAGE / name
+        for file in sorted(place.glob("*.py")) if place.is_dir() else [place]:
+            digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> Path | None:
+    """Make the folder for compiled code; None where nothing can be written."""
+    root = os.environ.get("BRRT_CACHE_DIR")
+    folder = Path(root) if root else user_cache_path("brrt", appauthor=False)
+    folder = folder / "kernels" / _sources_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def kernel(fn: F) -> F:
+    """Compile a loop that Python calls.
+
+    Nopython mode with IEEE semantics, without the GIL, cached on disk. No fastmath: the same seed
+    gives the same bits on every machine.
+    """
+    return _compiled(fn, {})
+
+
+def inlined(fn: F) -> F:
+    """Compile `fn` as `kernel` does, into every kernel that calls it."""
+    return _compiled(fn, INLINED)
+
+
+def borrowing(fn: F) -> F:
+    """Compile `fn` as `inlined` does, but only once: for what is long or seldom called."""
+    return _compiled(fn, {"_nrt": False})
+
+
+INLINED = {"forceinline": True, "_nrt": False, "nogil": True, "error_model": "numpy"}
+"""A call passes each array of a NamedTuple in seven words and counts references to it atomically;
+in a loop of a microsecond that is most of the time. So what a kernel calls is inlined, and counts
+no references: it borrows its arguments, and neither makes nor keeps an array."""
+
+
+def _compiled(fn: F, options: dict[str, Any]) -> F:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE_FOLDER or "")
+    try:
+        both = {"cache": CACHE_FOLDER is not None, "nogil": True, "error_model": "numpy", **options}
+        dispatcher = numba.njit(**both)(fn)
+    finally:
+        numba.config.CACHE_DIR = before
+    resolve = dispatcher.get_call_template
+    # Numba compiles a callee anew for each constant that it is called with; a kernel would take
+    # twice as long to compile, for nothing that inlining does not bring anyway.
+    dispatcher.get_call_template = lambda args, kws: resolve(
+        tuple(map(types.unliteral, args)), {k: types.unliteral(v) for k, v in kws.items()}
+    )
+    return cast("F", dispatcher)

@@ -1,0 +1,105 @@
+"""Configuration space as kernels see it: a robot among obstacles, under one set of names.
+
+A robot's file defines a NamedTuple of arrays with the static kernels `measure`, `length`, `gap`,
+`interpolate` and `segment_free`; the functions of the same names here resolve to them when a
+planner is compiled, so a planner knows no robot and a robot no planner.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numba import types
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from brrt.kernels.jit import INLINED, inlined
+
+Floats = NDArray[np.float64]
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _by_robot(function: F) -> F:
+    """Let kernels that call `function` get the kernel of that name from the space's class."""
+
+    @overload(function, strict=False, jit_options=INLINED)
+    def resolve(space: Any, *rest: Any) -> Any:  # noqa: ANN401, ARG001 - numba's types are untyped
+        if isinstance(space, types.BaseNamedTuple):
+            return getattr(space.instance_class, function.__name__).py_func
+        return None
+
+    return function
+
+
+@_by_robot
+def measure(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:  # noqa: ANN401
+    """Return a number that grows with the distance of A[i] and B[j] and is cheap to compare."""
+    return float(space.measure(space, A, i, B, j))
+
+
+@_by_robot
+def length(space: Any, measured: float) -> float:  # noqa: ANN401
+    """Return the distance that a `measure` stands for."""
+    return float(space.length(space, measured))
+
+
+@_by_robot
+def gap(space: Any, axis: int, x: float, split: float) -> float:  # noqa: ANN401
+    """Return a lower bound of `measure` from coordinate x to anything beyond a split."""
+    return float(space.gap(space, axis, x, split))
+
+
+@_by_robot
+def interpolate(
+    space: Any,  # noqa: ANN401
+    A: Floats,
+    i: int,
+    B: Floats,
+    j: int,
+    part: float,
+    out: Floats,
+    row: int,
+) -> None:
+    """Write the configuration at a part (0 to 1) of the way from A[i] to B[j] into out[row]."""
+    space.interpolate(space, A, i, B, j, part, out, row)
+
+
+@_by_robot
+def segment_free(space: Any, A: Floats, i: int, B: Floats, j: int) -> bool:  # noqa: ANN401
+    """Whether the motion from A[i] to B[j] is free of collisions, ends included."""
+    return bool(space.segment_free(space, A, i, B, j))
+
+
+@inlined
+def distance(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:  # noqa: ANN401
+    """Distance of A[i] and B[j] in the robot's metric."""
+    return length(space, measure(space, A, i, B, j))
+
+
+@inlined
+def sample_uniform(space: Any, rng: np.random.Generator, out: Floats, row: int) -> None:  # noqa: ANN401
+    """Draw a configuration evenly from the bounds into out[row]."""
+    for k in range(len(space.lower)):
+        low, high = space.lower[k], space.upper[k]
+        out[row, k] = min(low + (high - low) * rng.random(), high)
+
+
+@inlined
+def steer(
+    space: Any,  # noqa: ANN401
+    A: Floats,
+    i: int,
+    B: Floats,
+    j: int,
+    step: float,
+    out: Floats,
+    row: int,
+) -> float:
+    """Move from A[i] towards B[j] by at most `step`, into out[row]; return how far."""
+    far = distance(space, A, i, B, j)
+    if far <= step:
+        for k in range(len(space.lower)):
+            out[row, k] = B[j, k]
+        return far
+    interpolate(space, A, i, B, j, step / far, out, row)
+    return step

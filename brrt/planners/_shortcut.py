@@ -1,0 +1,84 @@
+"""The smoother's compiled loop."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Kind
+from brrt.kernels.emit import Buffer, emit, room
+from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.space import distance, segment_free
+
+Floats = NDArray[np.float64]
+
+SHORTCUT = int(Kind.SHORTCUT)
+
+WAYPOINTS, ATTEMPTS = range(2)
+"""Places in `counts`."""
+
+
+@inlined
+def path_cost(path: Floats, n: int, space: Any) -> float:  # noqa: ANN401
+    """Length of the first n waypoints, summed from the start."""
+    cost = 0.0
+    for i in range(1, n):
+        cost += distance(space, path, i - 1, path, i)
+    return cost
+
+
+@inlined
+def attempt_all(
+    path: Floats,
+    counts: NDArray[np.int64],
+    cost: Floats,
+    space: Any,  # noqa: ANN401
+    rng: np.random.Generator,
+    log: Buffer,
+    iteration: int,
+    attempts: int,
+) -> None:
+    """One call of `shorten`."""
+    cost[0] = path_cost(path, counts[WAYPOINTS], space)
+    while room(log) > 0 and counts[ATTEMPTS] < attempts and counts[WAYPOINTS] > 2:
+        n = counts[WAYPOINTS]
+        counts[ATTEMPTS] += 1
+        i, j = 0, 0
+        while j - i < 2:
+            # Waypoints that are neighbours already are drawn again: each pair is equally likely.
+            i, j = int(rng.random() * n), int(rng.random() * n)
+            i, j = min(i, j), max(i, j)
+        accepted = segment_free(space, path, i, path, j)
+        if accepted:
+            for k in range(j, n):
+                for axis in range(len(space.lower)):
+                    path[i + 1 + k - j, axis] = path[k, axis]
+            counts[WAYPOINTS] = n - (j - i - 1)
+            cost[0] = path_cost(path, counts[WAYPOINTS], space)
+        emit(log, SHORTCUT, iteration, i, j, int(accepted), cost[0], path, 0)
+
+
+@kernel
+def shorten(
+    path: Floats,
+    counts: NDArray[np.int64],
+    cost: Floats,
+    space: Any,  # noqa: ANN401
+    rng: np.random.Generator,
+    log: Buffer,
+    iteration: int,
+    attempts: int,
+) -> None:
+    """Try until `attempts` are made, the path is one motion, or the log is full.
+
+    Args:
+        path: Waypoints, shape (n, dof); shortened in place.
+        counts: How many of them stand, and attempts made so far, shape (2,).
+        cost: Length of the path as it stands, shape (1,); written.
+        space: Configuration space.
+        rng: Random draws.
+        log: Events.
+        iteration: The planner's count, for the events.
+        attempts: Attempts to make in all.
+    """
+    attempt_all(path, counts, cost, space, rng, log, iteration, attempts)

@@ -1,0 +1,31 @@
+"""What every planner is: settings with one method."""
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from brrt.events import Events
+from brrt.kernels.emit import EventLog
+from brrt.planners.stop import Stop
+from brrt.problem import Problem
+from brrt.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Planner(Settings):
+    """Base class; a planner from outside may as well be any object with this method."""
+
+    @abstractmethod
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """Yield batches of events until solved or stopped; the log is the only output.
+
+        Args:
+            problem: Robot, world, start and goal.
+            rng: Every random draw comes from here.
+            log: Numbers and times the events.
+            stop: Budget and interruption.
+        """

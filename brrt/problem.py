@@ -1,0 +1,63 @@
+"""What a planner is given: a robot in a world, and where it has to go."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+from brrt.robots import Point
+from brrt.worlds.world import World
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A query that is known to make sense.
+
+    Attributes:
+        world: Bounds and obstacles.
+        robot: What moves.
+        start: First configuration, shape (dof,).
+        goal: Last configuration, shape (dof,).
+
+    Raises:
+        BrrtError: Start or goal has the wrong size, is not finite, out of bounds or in collision.
+    """
+
+    world: World
+    robot: Point
+    start: Floats
+    goal: Floats
+
+    def __post_init__(self) -> None:
+        """Check start and goal."""
+        for name in ("start", "goal"):
+            q = np.array(getattr(self, name), dtype=np.float64).reshape(-1)
+            text = ",".join(f"{x:g}" for x in q)
+            if len(q) != self.dof:
+                raise BrrtError(
+                    f"{name} {text} has {len(q)} numbers; a configuration here has {self.dof}"
+                )
+            if not np.isfinite(q).all():
+                raise BrrtError(f"{name} {text} must be finite numbers")
+            why = self.robot.collision(self.world, q)
+            if why is not None:
+                lower, upper = (
+                    ",".join(f"{x:g}" for x in b) for b in (self.world.lower, self.world.upper)
+                )
+                raise BrrtError(
+                    f"{name} {text} {why}; choose a free one between {lower} and {upper}"
+                )
+            object.__setattr__(self, name, q)
+
+    @property
+    def dof(self) -> int:
+        """Numbers in a configuration."""
+        return self.robot.dof(self.world)
+
+    def space(self) -> Any:  # noqa: ANN401 - each robot has its own type
+        """Build what kernels see of it."""
+        return self.robot.space(self.world)

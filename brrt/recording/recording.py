@@ -1,0 +1,38 @@
+"""A recording that was read: the manifest, the world, and the events in order."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from brrt.events import Events
+from brrt.replay.metrics import Metrics
+from brrt.scenario import Manifest
+from brrt.worlds.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A recording on disk; its events are read anew by each call of `batches`.
+
+    Attributes:
+        manifest: What the run was.
+        world: The world it ran in.
+        batches: Call it for the events, in batches, in order.
+        result: The figures that the writer found at the end; None if it did not get there.
+    """
+
+    manifest: Manifest
+    world: World
+    batches: Callable[[], Iterator[Events]]
+    result: Mapping[str, Any] | None
+
+    def events(self) -> Events:
+        """Return the whole log at once."""
+        return Events.concat(self.manifest.dof, self.batches())
+
+    def metrics(self) -> Metrics:
+        """Fold the events into the run's figures."""
+        metrics = Metrics(self.manifest)
+        for batch in self.batches():
+            metrics.write(batch)
+        return metrics

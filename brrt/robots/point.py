@@ -1,0 +1,103 @@
+"""A point in the plane or in space; the metric is Euclidean."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
+from brrt.kernels.jit import inlined
+from brrt.settings import Settings
+from brrt.worlds.world import World
+
+Floats = NDArray[np.float64]
+
+
+class PointSpace(NamedTuple):
+    """Positions of a point; see `brrt.kernels.space` for what the kernels mean.
+
+    Attributes:
+        lower: Least coordinates, one number an axis.
+        upper: Greatest coordinates.
+        obstacles: What is in the way.
+    """
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    obstacles: Obstacles
+
+    @staticmethod
+    @inlined
+    def measure(space: "PointSpace", A: Floats, i: int, B: Floats, j: int) -> float:
+        """Square of the Euclidean distance."""
+        total = 0.0
+        for k in range(len(space.lower)):
+            step = B[j, k] - A[i, k]
+            total += step * step
+        return total
+
+    @staticmethod
+    @inlined
+    def length(space: "PointSpace", measured: float) -> float:  # noqa: ARG004
+        """Root of the square."""
+        return math.sqrt(measured)
+
+    @staticmethod
+    @inlined
+    def gap(space: "PointSpace", axis: int, x: float, split: float) -> float:  # noqa: ARG004
+        """Square of the distance along one axis."""
+        return (x - split) * (x - split)
+
+    @staticmethod
+    @inlined
+    def interpolate(
+        space: "PointSpace",
+        A: Floats,
+        i: int,
+        B: Floats,
+        j: int,
+        part: float,
+        out: Floats,
+        row: int,
+    ) -> None:
+        """Straight line."""
+        for k in range(len(space.lower)):
+            q = A[i, k] + (B[j, k] - A[i, k]) * part
+            out[row, k] = min(max(q, space.lower[k]), space.upper[k])
+
+    @staticmethod
+    @inlined
+    def segment_free(space: "PointSpace", A: Floats, i: int, B: Floats, j: int) -> bool:
+        """Exact against every shape; bounds are convex, so the ends decide about them."""
+        return not segment_hits(space.obstacles, A, i, B, j)
+
+
+@dataclass(frozen=True, slots=True)
+class Point(Settings):
+    """A point robot; its configuration is its position."""
+
+    def dof(self, world: World) -> int:
+        """Numbers in a configuration: the world's dimension."""
+        return world.dim
+
+    def space(self, world: World) -> PointSpace:
+        """Put the robot into a world."""
+        lower, upper = tuple(world.lower.tolist()), tuple(world.upper.tolist())
+        return PointSpace(lower, upper, build_obstacles(world))
+
+    def collision(self, world: World, q: Floats) -> str | None:
+        """Say why a configuration, shape (d,), is not free, or return None."""
+        if not world.inside(q):
+            return "is outside the bounds"
+        hit = world.obstacle_at(q)
+        return hit and f"is in collision with {hit}"
+
+    def distance(self, a: Floats, b: Floats) -> Floats:
+        """Distances between configurations, shape (..., d)."""
+        squares = (np.asarray(b) - np.asarray(a)) ** 2
+        total = squares[..., 0]
+        for k in range(1, squares.shape[-1]):
+            total = total + squares[..., k]
+        return np.asarray(np.sqrt(total))

@@ -1,0 +1,108 @@
+"""Drive a planner: plan, smooth, and hand every event to the sinks."""
+
+import platform
+from collections.abc import Callable, Iterable, Iterator
+from importlib.metadata import version
+from typing import Protocol
+
+import numpy as np
+
+from brrt.events import Events, Kind
+from brrt.kernels.emit import EventLog
+from brrt.planners.stop import Stop
+from brrt.replay.metrics import Metrics
+from brrt.scenario import Manifest, Scenario
+
+
+class Sink(Protocol):
+    """Where events go."""
+
+    def write(self, events: Events) -> None:
+        """Take a batch."""
+
+    def close(self, *, whole: bool) -> None:
+        """Release everything; `whole` says that the run came to its own end."""
+
+
+class Run:
+    """A scenario that has been found sound, ready to go once.
+
+    Args:
+        scenario: What to run.
+        batch: Events in a batch at most; the log does not depend on it.
+
+    Raises:
+        BrrtError: The scenario is of no use; nothing has been written anywhere.
+    """
+
+    def __init__(self, scenario: Scenario, *, batch: int = 16384) -> None:
+        self.problem = scenario.make_problem()
+        self._planner, self._smoother = scenario.make_planner(), scenario.make_smoother()
+        self._log = EventLog(
+            self.problem.dof, batch, logical_clock=scenario.clock == "logical"
+        )
+        self.stop = scenario.make_stop()
+        self.manifest = Manifest(
+            scenario=scenario,
+            start=tuple(self.problem.start.tolist()),
+            goal=tuple(self.problem.goal.tolist()),
+            dim=self.problem.world.dim,
+            dof=self.problem.dof,
+            epoch_ns=self._log.epoch_ns,
+            made_by=made_by(),
+        )
+
+    def events(self) -> Iterator[Events]:
+        """Plan, then smooth; yield what happens, in batches."""
+        rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
+        path, iteration = None, 0
+        for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
+            for event in batch[Kind.PATH]:
+                path, iteration = event["waypoints"], int(event["iteration"])
+            yield batch
+        if path is not None and self._smoother is not None and not self.stop.interrupted:
+            space = self.problem.space()
+            yield from self._smoother.smooth(path, space, rng, self._log, self.stop, iteration)
+
+    def execute(
+        self, sinks: Iterable[Sink] = (), watch: Callable[[Metrics], None] | None = None
+    ) -> Metrics:
+        """Run to the end, feeding the sinks; they are closed whatever happens.
+
+        Args:
+            sinks: Where the events go.
+            watch: Called with the figures so far after each batch.
+        """
+        sinks = list(sinks)
+        metrics = Metrics(self.manifest)
+        whole = False
+        try:
+            for batch in self.events():
+                for sink in sinks:
+                    sink.write(batch)
+                metrics.write(batch)
+                if watch is not None:
+                    watch(metrics)
+            whole = True
+        finally:
+            _close_all(sinks, whole=whole)
+        return metrics
+
+
+def _close_all(sinks: list[Sink], *, whole: bool) -> None:
+    """Close every sink, even if one of them fails."""
+    if sinks:
+        try:
+            sinks[0].close(whole=whole)
+        finally:
+            _close_all(sinks[1:], whole=whole)
+
+
+def made_by() -> dict[str, str]:
+    """Versions of brrt and of what decides its numbers, and the platform."""
+    names = {name: version(name) for name in ("brrt", "numpy", "numba", "llvmlite")}
+    return {
+        **names,
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }

@@ -1,0 +1,226 @@
+"""A scenario: everything that decides what a run does, as a user writes it and a file keeps it."""
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+
+from brrt.errors import BrrtError, unknown
+from brrt.planners import PLANNERS, Planner
+from brrt.planners.shortcut import Shortcut
+from brrt.planners.stop import Stop
+from brrt.problem import Problem
+from brrt.robots import ROBOTS
+from brrt.worlds import World, make_world
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """World, robot, query, planner, parameters, seed and budget.
+
+    Attributes:
+        world: A generator with parameters (`circles2d:n=50`) or a file.
+        robot: Name of a robot.
+        planner: Name of a planner.
+        params: The planner's settings where they differ from its defaults.
+        start: First configuration; the world's own by default.
+        goal: Last configuration; the world's own by default.
+        seed: Seed of every random draw of the planner and the smoother.
+        iterations: Iterations that the planner may make.
+        time: Seconds that it may take.
+        smooth: Shortcut the path once there is one.
+        shortcuts: Attempts of the smoother.
+        clock: `real`, or `logical`: event n at n us, so that files are equal byte by byte.
+    """
+
+    world: str = "circles2d"
+    robot: str = "point"
+    planner: str = "rrt"
+    params: Mapping[str, Any] = field(default_factory=dict)
+    start: tuple[float, ...] | None = None
+    goal: tuple[float, ...] | None = None
+    seed: int = 0
+    iterations: int = 1_000_000
+    time: float | None = None
+    smooth: bool = True
+    shortcuts: int = 100
+    clock: Literal["real", "logical"] = "real"
+
+    def __post_init__(self) -> None:
+        """Check what can be checked without making the world.
+
+        Raises:
+            BrrtError: A name is unknown or a number out of range.
+        """
+        if self.planner not in PLANNERS:
+            raise unknown("planner", self.planner, PLANNERS)
+        if self.robot not in ROBOTS:
+            raise unknown("robot", self.robot, ROBOTS)
+        if self.clock not in ("real", "logical"):
+            raise unknown("clock", self.clock, ("real", "logical"))
+        _whole("seed", self.seed, low=0)
+        _whole("iterations", self.iterations, low=1)
+        _whole("shortcuts", self.shortcuts, low=0)
+        if self.time is not None and not 0 < float(self.time) < np.inf:
+            raise BrrtError(f"time must be above 0 seconds, not {self.time}")
+        settings = self.make_planner().as_dict()
+        given = {name: settings[name] for name in self.params}
+        object.__setattr__(self, "params", given)
+
+    @classmethod
+    def parse(cls, values: Mapping[str, Any]) -> Self:
+        """Make a scenario from named values, as from TOML or a manifest.
+
+        Raises:
+            BrrtError: A name is unknown or a value of no use.
+        """
+        names = [f.name for f in fields(cls)]
+        for name in values:
+            if name not in names:
+                raise unknown("key of a scenario", name, names)
+        known = dict(values)
+        for name in ("start", "goal"):
+            if known.get(name) is not None:
+                known[name] = _configuration(name, known[name])
+        if not isinstance(known.get("params", {}), Mapping):
+            raise BrrtError("params must be a table of names and values")
+        return cls(**known)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a scenario from a TOML file.
+
+        Raises:
+            BrrtError: The file cannot be read or is not a scenario.
+        """
+        try:
+            values = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise BrrtError(f"{path}: {error.strerror or error}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise BrrtError(f"{path}: not TOML: {error}") from None
+        try:
+            return cls.parse(values)
+        except BrrtError as error:
+            raise BrrtError(f"{path}: {error}") from None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Names and values, as `parse` takes them."""
+        return asdict(self)
+
+    def with_stop_at(self, iterations: int) -> "Scenario":
+        """Return the scenario of a run that the clock or a person cut, ended at that iteration."""
+        return replace(self, iterations=max(1, iterations), time=None)
+
+    def make_planner(self) -> Planner:
+        """Make the planner with its settings."""
+        return PLANNERS[self.planner].parse(f"planner {self.planner}", self.params)
+
+    def make_smoother(self) -> Shortcut | None:
+        """Make the smoother, if there is to be one."""
+        return Shortcut(attempts=self.shortcuts) if self.smooth else None
+
+    def make_stop(self) -> Stop:
+        """Make the budget."""
+        return Stop(iterations=self.iterations, time_s=self.time)
+
+    def make_problem(self, world: World | None = None) -> Problem:
+        """Make the world, unless it is at hand, and put the robot and the query into it.
+
+        Raises:
+            BrrtError: The world cannot be made, or start or goal is missing or of no use.
+        """
+        ends = [None if q is None else np.array(q) for q in (self.start, self.goal)]
+        if world is None:
+            world = make_world(self.world, *ends)
+        start, goal = (
+            given if given is not None else own
+            for given, own in zip(ends, (world.start, world.goal), strict=True)
+        )
+        for name, q in (("start", start), ("goal", goal)):
+            if q is None:
+                example = ",".join(["x", "y", "z"][: world.dim])
+                raise BrrtError(f"world {self.world} has no {name} of its own; give --{name} {example}")
+        assert start is not None and goal is not None  # noqa: S101, PT018 - told apart above
+        return Problem(world, ROBOTS[self.robot](), start, goal)
+
+
+def _whole(name: str, value: Any, *, low: int) -> None:  # noqa: ANN401
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise BrrtError(f"{name} must be a whole number, not {value!r}")
+    if value < low:
+        raise BrrtError(f"{name} must be at least {low}, not {value}")
+
+
+def _configuration(name: str, value: Any) -> tuple[float, ...]:  # noqa: ANN401
+    parts = value.split(",") if isinstance(value, str) else value
+    try:
+        return tuple(float(part) for part in parts)
+    except (TypeError, ValueError):
+        raise BrrtError(f"{name} must be numbers like 1,2 and not {value!r}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """What a recording says about the run that made it, written before the first event.
+
+    Attributes:
+        scenario: The scenario.
+        start: First configuration, as resolved.
+        goal: Last configuration, as resolved.
+        dim: 2 or 3, the world's dimension.
+        dof: Numbers in a configuration.
+        epoch_ns: Wall clock (ns since 1970) at time 0 of the events.
+        made_by: Versions of brrt and of what it stands on, and the platform.
+    """
+
+    scenario: Scenario
+    start: tuple[float, ...]
+    goal: tuple[float, ...]
+    dim: int
+    dof: int
+    epoch_ns: int
+    made_by: Mapping[str, str]
+
+    FORMAT = "1"
+
+    def to_strings(self) -> dict[str, str]:
+        """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
+        return {
+            "format": self.FORMAT,
+            "scenario": json.dumps(self.scenario.as_dict()),
+            "start": json.dumps(self.start),
+            "goal": json.dumps(self.goal),
+            "dim": str(self.dim),
+            "dof": str(self.dof),
+            "epoch_ns": str(self.epoch_ns),
+            "made_by": json.dumps(dict(self.made_by)),
+        }
+
+    @classmethod
+    def from_strings(cls, texts: Mapping[str, str]) -> Self:
+        """Read what `to_strings` wrote.
+
+        Raises:
+            BrrtError: A field is missing or damaged, or the format is newer than this brrt.
+        """
+        if texts.get("format") != cls.FORMAT:
+            raise BrrtError(
+                f"recording format {texts.get('format')!r} is not {cls.FORMAT!r}; update brrt"
+            )
+        try:
+            return cls(
+                Scenario.parse(json.loads(texts["scenario"])),
+                tuple(map(float, json.loads(texts["start"]))),
+                tuple(map(float, json.loads(texts["goal"]))),
+                int(texts["dim"]),
+                int(texts["dof"]),
+                int(texts["epoch_ns"]),
+                dict(json.loads(texts["made_by"])),
+            )
+        except (KeyError, ValueError, TypeError, RecursionError) as error:
+            raise BrrtError(f"the manifest is damaged: {error!r}") from None

@@ -1,0 +1,155 @@
+"""Settings that check themselves: the base of planners, robots, smoothers and generators.
+
+A setting is a field of a frozen dataclass, declared with `param`, which holds its range, unit and
+meaning. The same declaration serves Python (`RRT(step=2)`), the command line (`--param step=2`),
+the help texts and the manifest.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from typing import Any, Literal, Self, get_args, get_origin, get_type_hints
+
+from brrt.errors import BrrtError, unknown
+
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+
+
+def param(
+    default: Any,  # noqa: ANN401 - as dataclasses.field
+    doc: str,
+    *,
+    low: float | None = None,
+    above: float | None = None,
+    high: float | None = None,
+    unit: str = "",
+) -> Any:  # noqa: ANN401 - as dataclasses.field
+    """Declare a setting with its default, meaning and range (`low` included, `above` excluded)."""
+    return field(
+        default=default,
+        metadata={"doc": doc, "low": low, "above": above, "high": high, "unit": unit},
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Base class; its subclasses are frozen dataclasses whose fields are declared by `param`."""
+
+    def __post_init__(self) -> None:
+        """Check every value against its declaration.
+
+        Raises:
+            BrrtError: A value has the wrong type or lies outside its range.
+        """
+        hints = get_type_hints(type(self))
+        for f in fields(self):
+            value = _typed(f.name, getattr(self, f.name), hints[f.name])
+            _check_range(f.name, value, f.metadata)
+            object.__setattr__(self, f.name, value)
+
+    @classmethod
+    def parse(cls, owner: str, values: Mapping[str, Any]) -> Self:
+        """Make settings from named values, texts allowed.
+
+        Args:
+            owner: What they configure, for messages ("planner rrt").
+            values: Names and values, as from TOML, JSON or the command line.
+
+        Raises:
+            BrrtError: A name is not known, or a value is of no use.
+        """
+        names = [f.name for f in fields(cls)]
+        for name in values:
+            if name not in names:
+                raise unknown(f"parameter of {owner}", name, names)
+        hints = get_type_hints(cls)
+        return cls(**{name: _typed(name, value, hints[name]) for name, value in values.items()})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Names and values, as `parse` takes them."""
+        return asdict(self)
+
+    @classmethod
+    def describe(cls) -> list[dict[str, str]]:
+        """One row a setting, for tables: name, default, unit, range, doc."""
+        hints = get_type_hints(cls)
+        return [
+            {
+                "name": f.name,
+                "default": "auto" if f.default is None else _text(f.default),
+                "unit": f.metadata["unit"],
+                "range": _range_text(f.metadata, hints[f.name]),
+                "doc": f.metadata["doc"],
+            }
+            for f in fields(cls)
+            if f.default is not MISSING
+        ]
+
+
+def _text(value: Any) -> str:  # noqa: ANN401
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _range_text(meta: Mapping[str, Any], hint: Any) -> str:  # noqa: ANN401
+    if get_origin(hint) is Literal:
+        return " | ".join(map(str, get_args(hint)))
+    if hint is bool:
+        return "true | false"
+    parts = []
+    if meta["low"] is not None:
+        parts.append(f">= {meta['low']:g}")
+    if meta["above"] is not None:
+        parts.append(f"> {meta['above']:g}")
+    if meta["high"] is not None:
+        parts.append(f"<= {meta['high']:g}")
+    return ", ".join(parts)
+
+
+def _typed(name: str, value: Any, hint: Any) -> Any:  # noqa: ANN401
+    """Bring `value` to the type of `hint`, or say what is wrong with it."""
+    if get_origin(hint) is Literal:
+        if value not in get_args(hint):
+            raise unknown(f"value of {name}", str(value), map(str, get_args(hint)))
+        return value
+    allowed = get_args(hint) or (hint,)
+    if type(None) in allowed:
+        if value is None or value in ("auto", ""):
+            return None
+        (hint,) = (a for a in allowed if a is not type(None))
+    if hint is bool:
+        return _as_bool(name, value)
+    try:
+        if isinstance(value, bool):
+            raise TypeError  # noqa: TRY301 - a truth value is no number
+        number = hint(value)
+    except (TypeError, ValueError, OverflowError):
+        kind = "a whole number" if hint is int else "a number"
+        raise BrrtError(f"{name} must be {kind}, not {value!r}") from None
+    if hint is int and isinstance(value, float) and value != number:
+        raise BrrtError(f"{name} must be a whole number, not {value!r}")
+    return number
+
+
+def _as_bool(name: str, value: Any) -> bool:  # noqa: ANN401
+    if isinstance(value, bool):
+        return value
+    text = str(value).lower()
+    if text not in _TRUE + _FALSE:
+        raise BrrtError(f"{name} must be true or false, not {value!r}")
+    return text in _TRUE
+
+
+def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:  # noqa: ANN401
+    if not isinstance(value, int | float):
+        return
+    if not math.isfinite(value):
+        raise BrrtError(f"{name} must be a finite number, not {value}")
+    low, above, high = meta["low"], meta["above"], meta["high"]
+    if low is not None and value < low:
+        raise BrrtError(f"{name} must be at least {low:g}, not {_text(value)}")
+    if above is not None and value <= above:
+        raise BrrtError(f"{name} must be above {above:g}, not {_text(value)}")
+    if high is not None and value > high:
+        raise BrrtError(f"{name} must be at most {high:g}, not {_text(value)}")

@@ -1,0 +1,105 @@
+"""Worlds: a generator is one class and one line here, a file format one function and one line."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError, unknown
+from brrt.worlds.blocks import load_blocks
+from brrt.worlds.generators import (
+    Boxes2D,
+    Boxes3D,
+    Circles2D,
+    Generator,
+    Spheres3D,
+    Squares2D,
+)
+from brrt.worlds.world import World
+
+GENERATORS: Mapping[str, type[Generator]] = {
+    "circles2d": Circles2D,
+    "squares2d": Squares2D,
+    "boxes2d": Boxes2D,
+    "boxes3d": Boxes3D,
+    "spheres3d": Spheres3D,
+}
+
+LOADERS: Mapping[str, Callable[[Path, str], World]] = {
+    ".json": lambda path, text: _named(str(path), World.from_json(text)),
+    ".txt": load_blocks,
+}
+"""Readers of world files by the file's ending."""
+
+_MAX_BYTES = 256_000_000
+
+
+def make_world(
+    spec: str,
+    start: NDArray[np.float64] | None = None,
+    goal: NDArray[np.float64] | None = None,
+) -> World:
+    """Make the world that a user names.
+
+    Args:
+        spec: A generator with parameters, such as `circles2d:n=50,max_radius=5`, or a file.
+        start: Point that a generator keeps free, shape (d,).
+        goal: Another.
+
+    Raises:
+        BrrtError: There is no such world, or it is not usable.
+    """
+    name, _, rest = spec.partition(":")
+    if name in GENERATORS:
+        settings = GENERATORS[name].parse(f"world {name}", _pairs(spec, rest))
+        return settings.make(spec, start, goal)
+    path = Path(spec)
+    if path.suffix in LOADERS or path.exists():
+        return load_world(path)
+    if "/" in spec or path.suffix:
+        raise BrrtError(f"{spec}: no such file")
+    raise unknown("world", name, GENERATORS)
+
+
+def load_world(path: Path) -> World:
+    """Read a world from a file.
+
+    Raises:
+        BrrtError: The file cannot be read, or is not a world.
+    """
+    if path.suffix not in LOADERS:
+        raise BrrtError(f"{path}: not a world that brrt reads; it reads {', '.join(LOADERS)}")
+    try:
+        size = path.stat().st_size
+        if size > _MAX_BYTES:
+            raise BrrtError(f"{path}: {size:,} bytes are too many; a world has {_MAX_BYTES:,}")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise BrrtError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise BrrtError(f"{path}: not a text file") from None
+    try:
+        return LOADERS[path.suffix](path, text)
+    except BrrtError as error:
+        message = str(error)
+        raise BrrtError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+
+
+def _named(name: str, world: World) -> World:
+    return World(
+        name, world.lower, world.upper, world.balls, world.boxes, world.start, world.goal
+    )
+
+
+def _pairs(spec: str, text: str) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        key, equals, value = part.partition("=")
+        if not equals:
+            raise BrrtError(f"world {spec}: {part!r} must read name=value")
+        pairs[key.strip()] = value.strip()
+    return pairs
+
+
+__all__ = ["GENERATORS", "LOADERS", "Generator", "World", "load_world", "make_world"]

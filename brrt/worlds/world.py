@@ -1,0 +1,138 @@
+"""A world: bounds and obstacles."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+
+SCHEMA, VERSION = "brrt.world", 1
+Floats = NDArray[np.float64]
+
+
+def _rows(name: str, values: Any, width: int) -> Floats:  # noqa: ANN401 - from JSON or a user
+    try:
+        array = np.array(values, dtype=np.float64)
+        array = array.reshape(-1, width) if array.size else np.empty((0, width))
+    except (TypeError, ValueError):
+        raise BrrtError(f"world: {name} must be rows of {width} numbers") from None
+    if not np.isfinite(array).all():
+        raise BrrtError(f"world: {name} must hold finite numbers only")
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class World:
+    """Axis-aligned bounds in 2D or 3D with closed obstacles: touching one is a collision.
+
+    Attributes:
+        name: What the user asked for: a generator with its parameters, or a file.
+        lower: Least corner of the bounds, shape (d,).
+        upper: Greatest corner of the bounds, shape (d,).
+        balls: Circles or spheres, one a row: centre, radius; shape (n, d + 1).
+        boxes: Axis-aligned boxes, one a row: least corner, greatest corner; shape (m, 2 d).
+        start: Suggested start position, shape (d,).
+        goal: Suggested goal position, shape (d,).
+
+    Raises:
+        BrrtError: A shape is wrong, a number is not finite, or a minimum exceeds its maximum.
+    """
+
+    name: str
+    lower: Floats
+    upper: Floats
+    balls: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    boxes: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    start: Floats | None = None
+    goal: Floats | None = None
+
+    def __post_init__(self) -> None:
+        """Bring the arrays to float64 and check them."""
+        dim = int(np.size(self.lower))
+        if dim not in (2, 3) or np.size(self.upper) != dim:
+            raise BrrtError(f"world: bounds must have 2 or 3 coordinates, not {dim}")
+        widths = {"lower": dim, "upper": dim, "balls": dim + 1, "boxes": 2 * dim}
+        for name, width in widths.items():
+            rows = _rows(name, getattr(self, name), width)
+            object.__setattr__(self, name, rows[0] if name in ("lower", "upper") else rows)
+        for name in ("start", "goal"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _rows(name, getattr(self, name), dim)[0])
+        if not (self.lower < self.upper).all():
+            raise BrrtError("world: each upper bound must be above its lower bound")
+        if (self.boxes[:, :dim] > self.boxes[:, dim:]).any():
+            raise BrrtError("world: a box has a minimum above its maximum")
+        if (self.balls[:, dim] < 0).any():
+            raise BrrtError("world: a radius is below zero")
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return len(self.lower)
+
+    @property
+    def extent(self) -> float:
+        """The longest side of the bounds."""
+        return float((self.upper - self.lower).max())
+
+    def inside(self, point: Sequence[float] | Floats) -> bool:
+        """Whether a point, shape (d,), lies within the closed bounds."""
+        p = np.asarray(point)
+        return bool(((self.lower <= p) & (p <= self.upper)).all())
+
+    def obstacle_at(self, point: Sequence[float] | Floats) -> str | None:
+        """Name the first obstacle that touches a point, shape (d,), or return None."""
+        p = np.asarray(point, dtype=np.float64)
+        d = self.dim
+        in_box = ((self.boxes[:, :d] <= p) & (p <= self.boxes[:, d:])).all(axis=1)
+        if in_box.any():
+            i = int(in_box.argmax())
+            return f"box {i} ({_numbers(self.boxes[i, :d])} to {_numbers(self.boxes[i, d:])})"
+        for i, ball in enumerate(self.balls):
+            if math.dist(ball[:d], p) <= ball[d]:
+                return f"ball {i} (centre {_numbers(ball[:d])}, radius {ball[d]:g})"
+        return None
+
+    def to_json(self) -> str:
+        """Return the world as text that `from_json` reads back to the same numbers."""
+        data: dict[str, Any] = {"schema": SCHEMA, "version": VERSION, "name": self.name}
+        for name in ("lower", "upper", "start", "goal", "balls", "boxes"):
+            value = getattr(self, name)
+            if value is not None:
+                data[name] = value.tolist()
+        return json.dumps(data)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Self:
+        """Read what `to_json` wrote.
+
+        Raises:
+            BrrtError: The text is not such a world.
+        """
+        try:
+            data = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise BrrtError(f"not a JSON world: {error}") from None
+        if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+            raise BrrtError(f'not a brrt world: the field "schema" must be "{SCHEMA}"')
+        if data.get("version") != VERSION:
+            raise BrrtError(f"world version {data.get('version')!r} is not {VERSION}; update brrt")
+        known = ("lower", "upper", "balls", "boxes", "start", "goal")
+        for name in ("lower", "upper"):
+            if name not in data:
+                raise BrrtError(f'not a whole brrt world: the field "{name}" is missing')
+        return cls(str(data.get("name", "")), **{k: data[k] for k in known if k in data})
+
+    def save(self, path: Path) -> None:
+        """Write the world as JSON."""
+        path.write_text(self.to_json() + "\n")
+
+
+def _numbers(values: Floats) -> str:
+    return ", ".join(f"{v:g}" for v in values)
