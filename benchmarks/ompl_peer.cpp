@@ -442,4 +442,5 @@ int main(int argc, char **argv) {
         std::fprintf(stderr, "ompl_peer: %s\n", error.what());
         return 2;
     }
+    return 0;
 }

@@ -1,0 +1,51 @@
+"""The flight recorder for motion planners: run, record every event, replay offline.
+
+import brrt
+
+run = brrt.Run(brrt.Scenario(world="circles2d:n=80", seed=7))
+log = brrt.Memory()
+metrics = run.execute([log])
+tree = brrt.forest(log.events())[0]
+"""
+
+from brrt.errors import BrrtError, RecordingError
+from brrt.events import Events, Kind
+from brrt.planners import PLANNERS, RRT, Planner
+from brrt.problem import Problem
+from brrt.recording import McapSink, Memory, Recording, read
+from brrt.replay.diff import Difference, first_difference
+from brrt.replay.forest import Tree, forest
+from brrt.replay.metrics import Metrics
+from brrt.robots import ROBOTS, Point
+from brrt.run import Run, Sink
+from brrt.scenario import Manifest, Scenario
+from brrt.worlds import GENERATORS, World, make_world
+
+__all__ = [
+    "GENERATORS",
+    "PLANNERS",
+    "ROBOTS",
+    "RRT",
+    "BrrtError",
+    "Difference",
+    "Events",
+    "Kind",
+    "Manifest",
+    "McapSink",
+    "Memory",
+    "Metrics",
+    "Planner",
+    "Point",
+    "Problem",
+    "Recording",
+    "RecordingError",
+    "Run",
+    "Scenario",
+    "Sink",
+    "Tree",
+    "World",
+    "first_difference",
+    "forest",
+    "make_world",
+    "read",
+]

@@ -79,6 +79,9 @@ class Stage(IntEnum):
     SMOOTHED = 1
 
 
+EnumClass = type[IntEnum]
+
+
 @dataclass(frozen=True, slots=True)
 class Field:
     """One field of a kind of event.
@@ -90,7 +93,7 @@ class Field:
     name: str
     type: str
     doc: str
-    choices: type[IntEnum] | None = None
+    choices: "EnumClass | None" = None
 
 
 _TREE = Field("tree", "uint8", "0 grows from the start")

@@ -1,6 +1,6 @@
 """What a planner is given: a robot in a world, and where it has to go."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ class Problem:
         robot: What moves.
         start: First configuration, shape (dof,).
         goal: Last configuration, shape (dof,).
+        space: The robot's configuration space in this world, as kernels see it.
 
     Raises:
         BrrtError: Start or goal has the wrong size, is not finite, out of bounds or in collision.
@@ -31,6 +32,7 @@ class Problem:
     robot: Point
     start: Floats
     goal: Floats
+    space: Any = field(init=False)
 
     def __post_init__(self) -> None:
         """Check start and goal."""
@@ -52,12 +54,9 @@ class Problem:
                     f"{name} {text} {why}; choose a free one between {lower} and {upper}"
                 )
             object.__setattr__(self, name, q)
+        object.__setattr__(self, "space", self.robot.space(self.world))
 
     @property
     def dof(self) -> int:
         """Numbers in a configuration."""
         return self.robot.dof(self.world)
-
-    def space(self) -> Any:  # noqa: ANN401 - each robot has its own type
-        """Build what kernels see of it."""
-        return self.robot.space(self.world)

@@ -38,9 +38,8 @@ class Run:
     def __init__(self, scenario: Scenario, *, batch: int = 16384) -> None:
         self.problem = scenario.make_problem()
         self._planner, self._smoother = scenario.make_planner(), scenario.make_smoother()
-        self._log = EventLog(
-            self.problem.dof, batch, logical_clock=scenario.clock == "logical"
-        )
+        self._compile()
+        self._log = EventLog(self.problem.dof, batch, logical_clock=scenario.clock == "logical")
         self.stop = scenario.make_stop()
         self.manifest = Manifest(
             scenario=scenario,
@@ -52,6 +51,17 @@ class Run:
             made_by=made_by(),
         )
 
+    def _compile(self) -> None:
+        """Load the kernels, or compile them: one iteration, before the run's clock starts."""
+        problem, stop = self.problem, Stop(iterations=1)
+        rng, log = np.random.Generator(np.random.PCG64(0)), EventLog(problem.dof, 4096)
+        for _ in self._planner.solve(problem, rng, log, stop):
+            pass
+        if self._smoother is not None:
+            path = np.array([problem.start, problem.goal])
+            for _ in self._smoother.smooth(path, problem.space, rng, log, stop, 0):
+                pass
+
     def events(self) -> Iterator[Events]:
         """Plan, then smooth; yield what happens, in batches."""
         rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
@@ -61,7 +71,7 @@ class Run:
                 path, iteration = event["waypoints"], int(event["iteration"])
             yield batch
         if path is not None and self._smoother is not None and not self.stop.interrupted:
-            space = self.problem.space()
+            space = self.problem.space
             yield from self._smoother.smooth(path, space, rng, self._log, self.stop, iteration)
 
     def execute(

@@ -144,19 +144,21 @@ class Scenario:
         for name, q in (("start", start), ("goal", goal)):
             if q is None:
                 example = ",".join(["x", "y", "z"][: world.dim])
-                raise BrrtError(f"world {self.world} has no {name} of its own; give --{name} {example}")
+                raise BrrtError(
+                    f"world {self.world} has no {name} of its own; give --{name} {example}"
+                )
         assert start is not None and goal is not None  # noqa: S101, PT018 - told apart above
         return Problem(world, ROBOTS[self.robot](), start, goal)
 
 
-def _whole(name: str, value: Any, *, low: int) -> None:  # noqa: ANN401
+def _whole(name: str, value: Any, *, low: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int):
         raise BrrtError(f"{name} must be a whole number, not {value!r}")
     if value < low:
         raise BrrtError(f"{name} must be at least {low}, not {value}")
 
 
-def _configuration(name: str, value: Any) -> tuple[float, ...]:  # noqa: ANN401
+def _configuration(name: str, value: Any) -> tuple[float, ...]:
     parts = value.split(",") if isinstance(value, str) else value
     try:
         return tuple(float(part) for part in parts)

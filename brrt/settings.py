@@ -16,14 +16,14 @@ _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
 def param(
-    default: Any,  # noqa: ANN401 - as dataclasses.field
+    default: Any,
     doc: str,
     *,
     low: float | None = None,
     above: float | None = None,
     high: float | None = None,
     unit: str = "",
-) -> Any:  # noqa: ANN401 - as dataclasses.field
+) -> Any:
     """Declare a setting with its default, meaning and range (`low` included, `above` excluded)."""
     return field(
         default=default,
@@ -86,13 +86,13 @@ class Settings:
         ]
 
 
-def _text(value: Any) -> str:  # noqa: ANN401
+def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _range_text(meta: Mapping[str, Any], hint: Any) -> str:  # noqa: ANN401
+def _range_text(meta: Mapping[str, Any], hint: Any) -> str:
     if get_origin(hint) is Literal:
         return " | ".join(map(str, get_args(hint)))
     if hint is bool:
@@ -107,7 +107,7 @@ def _range_text(meta: Mapping[str, Any], hint: Any) -> str:  # noqa: ANN401
     return ", ".join(parts)
 
 
-def _typed(name: str, value: Any, hint: Any) -> Any:  # noqa: ANN401
+def _typed(name: str, value: Any, hint: Any) -> Any:
     """Bring `value` to the type of `hint`, or say what is wrong with it."""
     if get_origin(hint) is Literal:
         if value not in get_args(hint):
@@ -132,7 +132,7 @@ def _typed(name: str, value: Any, hint: Any) -> Any:  # noqa: ANN401
     return number
 
 
-def _as_bool(name: str, value: Any) -> bool:  # noqa: ANN401
+def _as_bool(name: str, value: Any) -> bool:
     if isinstance(value, bool):
         return value
     text = str(value).lower()
@@ -141,7 +141,7 @@ def _as_bool(name: str, value: Any) -> bool:  # noqa: ANN401
     return text in _TRUE
 
 
-def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:  # noqa: ANN401
+def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:
     if not isinstance(value, int | float):
         return
     if not math.isfinite(value):

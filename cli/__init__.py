@@ -1,0 +1,1 @@
+"""The `brrt` command, installed as `brrt_cli`; only its entry point imports it."""

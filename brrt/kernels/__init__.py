@@ -1,0 +1,1 @@
+"""What planners share, compiled: events, clock, nearest neighbours, broad phase, spaces."""

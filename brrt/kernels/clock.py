@@ -14,10 +14,10 @@ _MONOTONIC = {"linux": 1, "darwin": 8}
 
 
 @intrinsic
-def _clock_gettime(typingctx: Any, clock_id: Any) -> Any:  # noqa: ANN401, ARG001
+def _clock_gettime(typingctx: Any, clock_id: Any) -> Any:  # noqa: ARG001
     """Call the C library's clock_gettime; the result is in nanoseconds."""
 
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ANN401, ARG001
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
         int64 = ir.IntType(64)
         timespec = ir.LiteralStructType([int64, int64])
         place = cgutils.alloca_once(builder, timespec)
@@ -48,4 +48,4 @@ else:
     @numba.extending.register_jitable
     def now_ns() -> int:
         """Nanoseconds on the clock of `time.perf_counter_ns`."""
-        return int(_clock_gettime(_CLOCK_ID))
+        return int(_clock_gettime(_CLOCK_ID))  # type: ignore[call-arg]

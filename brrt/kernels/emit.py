@@ -43,7 +43,7 @@ class Buffer(NamedTuple):
 @inlined
 def room(buffer: Buffer) -> int:
     """Events that still fit."""
-    return len(buffer.kind) - buffer.state[_COUNT]
+    return len(buffer.kind) - int(buffer.state[_COUNT])
 
 
 @inlined
@@ -154,7 +154,7 @@ class EventLog:
         """Seconds since the log was opened."""
         return (time.perf_counter_ns() - self._origin) / 1e9
 
-    def emit(self, kind: Kind, iteration: int, **fields: Any) -> None:  # noqa: ANN401
+    def emit(self, kind: Kind, iteration: int, **fields: Any) -> None:
         """Append an event; the caller saw to it that there is `room`.
 
         Args:
@@ -217,5 +217,3 @@ class EventLog:
         buffer.state[_FIRST_SEQ] += n
         buffer.state[_COUNT] = 0
         return Events(self.dof, tables)
-
-

@@ -108,7 +108,9 @@ def _first_crossing(x: float, step: float, lower: float, cell: float, at: int) -
 
 
 @inlined
-def _hits_slab(x: float, step: float, inverse: float, low: float, high: float) -> tuple[float, float]:
+def _hits_slab(
+    x: float, step: float, inverse: float, low: float, high: float
+) -> tuple[float, float]:
     """Parameters between which a line lies within a slab; (inf, -inf) if it never does."""
     if abs(step) < _TINY:
         if max(x, x + step) < low or min(x, x + step) > high:

@@ -46,6 +46,11 @@ def _cache_folder() -> Path | None:
 CACHE_FOLDER = _cache_folder()
 
 
+def is_cold() -> bool:
+    """Whether nothing has been compiled here yet, so that the first run will take a while."""
+    return CACHE_FOLDER is None or not any(CACHE_FOLDER.rglob("*.nbi"))
+
+
 def kernel(fn: F) -> F:
     """Compile a loop that Python calls.
 
@@ -79,6 +84,8 @@ def _compiled(fn: F, options: dict[str, Any]) -> F:
         dispatcher = numba.njit(**both)(fn)
     finally:
         numba.config.CACHE_DIR = before
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return fn
     resolve = dispatcher.get_call_template
     # Numba compiles a callee anew for each constant that it is called with; a kernel would take
     # twice as long to compile, for nothing that inlining does not bring anyway.

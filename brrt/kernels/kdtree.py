@@ -6,179 +6,326 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.kernels.jit import borrowing, inlined
-from brrt.kernels.space import gap, measure
+from brrt.kernels.space import box_measure, measure
 
 Floats = NDArray[np.float64]
 
 BUCKET = 16
+_FRESH = 12
+"""A rebuilt bucket holds at most this many, so that it need not split at once."""
+
 _LEAF = -1
-_NODES, _CELLS, _BUCKETS, _DEPTH = range(4)
 _STACK = 256
+"""More than twice the depth that the balance allows for 2^31 nodes."""
+
 _MEAN_FILL = 4
-"""Buckets are planned for at least this many nodes; splits at the mean fill them with about 10."""
+"""Room is planned for buckets with at least this many nodes; they come to hold about 10."""
+
+_REBUILD_NEEDS = 4
+"""Buckets that must be left for a full one to be split."""
+
+_NODES, _CELLS, _BUCKETS, _FREE_CELLS, _FREE_BUCKETS = range(5)
 
 
 class KdTree(NamedTuple):
-    """Cells are split at the mean of their widest axis once they hold more than 16 nodes.
+    """Cells split once they hold more than 16 nodes, and are rebuilt once they are lopsided.
+
+    Coordinates stand twice, in the planner's array and side by side in the buckets, where a
+    query finds those of a leaf in a few lines of the cache.
 
     Attributes:
         axis: Axis that splits each cell, -1 for a leaf; shape (cells,).
         split: Coordinate of the split, shape (cells,).
-        child: Cell below and cell above the split; for a leaf its bucket and how many it holds;
-            shape (cells, 2).
+        child: Cell below and cell above the split; for a leaf its bucket, twice; shape (cells, 2).
+        size: Nodes in each cell, shape (cells,).
+        low: Least coordinates of each cell's nodes, shape (cells, d).
+        high: Greatest coordinates of each cell's nodes, shape (cells, d).
         points: Coordinates, 16 rows a bucket, shape (16 buckets, d).
         nodes: Node number of each row, shape (16 buckets,).
-        counts: Nodes, cells and buckets in use and the depth of the tree, shape (4,).
-        stack: Cells to visit, shape (more than the depth,).
-        stack_bound: Lower bounds of the distance to what they hold, shape as `stack`.
+        counts: Nodes, cells and buckets in use, cells and buckets given back; shape (5,).
+        free_cells: Cells given back, shape (cells,).
+        free_buckets: Buckets given back, shape (buckets,).
+        gathered: Nodes of a cell that is being rebuilt, shape (capacity,).
+        stack: Cells to visit, shape (256,).
+        stack_bound: Lower bounds of the measure to what they hold, shape (256,).
+        work: Cells to rebuild, and which of the gathered nodes are theirs, shape (256, 3).
     """
 
     axis: NDArray[np.int8]
     split: Floats
     child: NDArray[np.int32]
+    size: NDArray[np.int32]
+    low: Floats
+    high: Floats
     points: Floats
     nodes: NDArray[np.int32]
     counts: NDArray[np.int64]
+    free_cells: NDArray[np.int32]
+    free_buckets: NDArray[np.int32]
+    gathered: NDArray[np.int32]
     stack: NDArray[np.int32]
     stack_bound: Floats
+    work: NDArray[np.int64]
 
 
 def rooted_kdtree(root: Floats, capacity: int) -> KdTree:
-    """Make a tree that holds node 0 at `root`, shape (d,), with room for `capacity` nodes."""
-    tree = _empty_kdtree(len(root), capacity, _STACK)
-    tree.points[0], tree.nodes[0], tree.child[0, 1], tree.counts[_NODES] = root, 0, 1, 1
-    return tree
+    """Make a tree that holds node 0 at `root`, shape (d,), with room for `capacity` nodes.
 
-
-def _empty_kdtree(d: int, capacity: int, stack: int) -> KdTree:
-    buckets = capacity // _MEAN_FILL + 2
-    tree = KdTree(
-        axis=np.empty(2 * buckets, np.int8),
-        split=np.empty(2 * buckets),
-        child=np.empty((2 * buckets, 2), np.int32),
-        points=np.empty((BUCKET * buckets, d)),
-        nodes=np.empty(BUCKET * buckets, np.int32),
-        counts=np.array([0, 1, 1, 0]),
-        stack=np.empty(stack, np.int32),
-        stack_bound=np.empty(stack),
-    )
-    tree.axis[0], tree.child[0] = _LEAF, (0, 0)
+    Memory is taken only as the tree fills.
+    """
+    tree = _empty_kdtree(len(root), capacity)
+    tree.counts[:3] = 1
+    tree.axis[0], tree.child[0], tree.size[0] = _LEAF, 0, 1
+    tree.low[0], tree.high[0], tree.points[0], tree.nodes[0] = root, root, root, 0
     return tree
 
 
 def grown_kdtree(tree: KdTree, capacity: int) -> KdTree:
     """Return the same tree with room for `capacity` nodes."""
-    stack = max(len(tree.stack), 2 * int(tree.counts[_DEPTH]))
-    larger = _empty_kdtree(tree.points.shape[1], capacity, stack)
-    cells, buckets = int(tree.counts[_CELLS]), int(tree.counts[_BUCKETS])
-    for name in ("axis", "split", "child"):
-        getattr(larger, name)[:cells] = getattr(tree, name)[:cells]
-    for name in ("points", "nodes"):
-        getattr(larger, name)[: BUCKET * buckets] = getattr(tree, name)[: BUCKET * buckets]
-    larger.counts[:] = tree.counts
+    larger = _empty_kdtree(tree.points.shape[1], capacity)
+    arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(larger, tree, strict=True))  # type: ignore[arg-type]
+    for new, old in arrays:
+        new[: len(old)] = old
     return larger
+
+
+def _empty_kdtree(d: int, capacity: int) -> KdTree:
+    buckets = capacity // _MEAN_FILL + 2 * _REBUILD_NEEDS
+    cells = 2 * buckets
+    return KdTree(
+        axis=np.empty(cells, np.int8),
+        split=np.empty(cells),
+        child=np.empty((cells, 2), np.int32),
+        size=np.empty(cells, np.int32),
+        low=np.empty((cells, d)),
+        high=np.empty((cells, d)),
+        points=np.empty((BUCKET * buckets, d)),
+        nodes=np.empty(BUCKET * buckets, np.int32),
+        counts=np.zeros(5, np.int64),
+        free_cells=np.empty(cells, np.int32),
+        free_buckets=np.empty(buckets, np.int32),
+        gathered=np.empty(capacity, np.int32),
+        stack=np.empty(_STACK, np.int32),
+        stack_bound=np.empty(_STACK),
+        work=np.empty((_STACK, 3), np.int64),
+    )
+
+
+@inlined
+def _buckets_left(tree: KdTree) -> int:
+    counts = tree.counts
+    return len(tree.free_buckets) - int(counts[_BUCKETS] - counts[_FREE_BUCKETS])
 
 
 @inlined
 def has_room(tree: KdTree) -> bool:
     """Whether another node fits, even if it splits a bucket."""
-    buckets = (tree.counts[_BUCKETS] + 1) * BUCKET <= len(tree.nodes)
-    return buckets and tree.counts[_DEPTH] + 1 < len(tree.stack)
+    return _buckets_left(tree) >= _REBUILD_NEEDS and int(tree.counts[_NODES]) < len(tree.gathered)
+
+
+@inlined
+def _new_cell(tree: KdTree) -> int:
+    if tree.counts[_FREE_CELLS] > 0:
+        tree.counts[_FREE_CELLS] -= 1
+        return int(tree.free_cells[tree.counts[_FREE_CELLS]])
+    tree.counts[_CELLS] += 1
+    return int(tree.counts[_CELLS] - 1)
+
+
+@inlined
+def _new_bucket(tree: KdTree) -> int:
+    if tree.counts[_FREE_BUCKETS] > 0:
+        tree.counts[_FREE_BUCKETS] -= 1
+        return int(tree.free_buckets[tree.counts[_FREE_BUCKETS]])
+    tree.counts[_BUCKETS] += 1
+    return int(tree.counts[_BUCKETS] - 1)
+
+
+@inlined
+def _stretch(tree: KdTree, cell: int, q: Floats, node: int, d: int) -> None:
+    """Let a cell's box reach a node."""
+    for k in range(d):
+        tree.low[cell, k] = min(tree.low[cell, k], q[node, k])
+        tree.high[cell, k] = max(tree.high[cell, k], q[node, k])
+
+
+@inlined
+def _widest_axis(tree: KdTree, cell: int, d: int) -> int:
+    """Return the longest side of a cell's box; -1 where all its nodes coincide."""
+    axis, widest = -1, 0.0
+    for k in range(d):
+        if tree.high[cell, k] - tree.low[cell, k] > widest:
+            axis, widest = k, tree.high[cell, k] - tree.low[cell, k]
+    return axis
+
+
+@inlined
+def _gather(tree: KdTree, root: int) -> int:
+    """List the nodes below a cell, give back all cells and buckets but itself; return how many."""
+    n, top = 0, 1
+    tree.stack[0] = root
+    while top > 0:
+        top -= 1
+        cell = tree.stack[top]
+        if tree.axis[cell] == _LEAF:
+            bucket = tree.child[cell, 0]
+            for at in range(bucket * BUCKET, bucket * BUCKET + tree.size[cell]):
+                tree.gathered[n] = tree.nodes[at]
+                n += 1
+            tree.free_buckets[tree.counts[_FREE_BUCKETS]] = bucket
+            tree.counts[_FREE_BUCKETS] += 1
+        else:
+            tree.stack[top], tree.stack[top + 1] = tree.child[cell, 0], tree.child[cell, 1]
+            top += 2
+        if cell != root:
+            tree.free_cells[tree.counts[_FREE_CELLS]] = cell
+            tree.counts[_FREE_CELLS] += 1
+    return n
+
+
+@inlined
+def _partition(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int, split: float) -> int:
+    """Put the nodes below the split first; return where the others begin."""
+    middle = lo
+    for i in range(lo, hi):
+        if q[ids[i], axis] < split:
+            ids[i], ids[middle] = ids[middle], ids[i]
+            middle += 1
+    return middle
+
+
+@inlined
+def _median(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int) -> float:
+    """Coordinate of the middle one of the nodes ids[lo:hi] (quickselect, in place)."""
+    middle = (lo + hi) // 2
+    left, right = lo, hi - 1
+    while left < right:
+        pivot = q[ids[(left + right) // 2], axis]
+        i, j = left, right
+        while i <= j:
+            while q[ids[i], axis] < pivot:
+                i += 1
+            while q[ids[j], axis] > pivot:
+                j -= 1
+            if i <= j:
+                ids[i], ids[j] = ids[j], ids[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            right = j
+        elif middle >= i:
+            left = i
+        else:
+            break
+    return float(q[ids[middle], axis])
 
 
 @borrowing
-def _split(tree: KdTree, cell: int, d: int) -> bool:
-    """Share a full leaf's nodes between two new leaves; False if they all coincide."""
-    bucket = tree.child[cell, 0]
-    first = bucket * BUCKET
-    axis, widest, least, most, mean = -1, 0.0, 0.0, 0.0, 0.0
-    for k in range(d):
-        low, high, total = np.inf, -np.inf, 0.0
-        for row in range(first, first + BUCKET):
-            x = tree.points[row, k]
-            low, high, total = min(low, x), max(high, x), total + x
-        if high - low > widest:
-            axis, widest, least, most, mean = k, high - low, low, high, total / BUCKET
-    if axis < 0:
-        return False
-    split = mean if mean > least else most
-    other = tree.counts[_BUCKETS]
-    below, above = 0, 0
-    for row in range(first, first + BUCKET):
-        if tree.points[row, axis] >= split:
-            target = other * BUCKET + above
-            above += 1
-        else:
-            target = first + below
-            below += 1
+def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
+    """Build a cell anew, halving at the median of its longest side down to the buckets."""
+    if _buckets_left(tree) < max(tree.size[root] // 4, _REBUILD_NEEDS):
+        return
+    tree.work[0, 0], tree.work[0, 1], tree.work[0, 2] = root, 0, _gather(tree, root)
+    ids, top = tree.gathered, 1
+    while top > 0:
+        top -= 1
+        cell, lo, hi = tree.work[top, 0], tree.work[top, 1], tree.work[top, 2]
+        tree.size[cell] = hi - lo
         for k in range(d):
-            tree.points[target, k] = tree.points[row, k]
-        tree.nodes[target] = tree.nodes[row]
-    left = tree.counts[_CELLS]
-    right = left + 1
-    tree.counts[_CELLS] += 2
-    tree.counts[_BUCKETS] += 1
-    tree.axis[cell], tree.split[cell] = axis, split
-    tree.child[cell, 0], tree.child[cell, 1] = left, right
-    tree.axis[left], tree.child[left, 0], tree.child[left, 1] = _LEAF, bucket, below
-    tree.axis[right], tree.child[right, 0], tree.child[right, 1] = _LEAF, other, above
-    return True
+            tree.low[cell, k], tree.high[cell, k] = np.inf, -np.inf
+        for i in range(lo, hi):
+            _stretch(tree, cell, q, ids[i], d)
+        axis = _widest_axis(tree, cell, d)
+        if hi - lo <= _FRESH or axis < 0:
+            bucket = _new_bucket(tree)
+            tree.axis[cell], tree.child[cell, 0], tree.child[cell, 1] = _LEAF, bucket, bucket
+            for i in range(lo, hi):
+                tree.nodes[bucket * BUCKET + i - lo] = ids[i]
+                for k in range(d):
+                    tree.points[bucket * BUCKET + i - lo, k] = q[ids[i], k]
+            continue
+        split = _median(ids, lo, hi, q, axis)
+        if split <= tree.low[cell, axis]:
+            # Half of them share the least coordinate: split right above it.
+            least, split = split, np.inf
+            for i in range(lo, hi):
+                if q[ids[i], axis] > least:
+                    split = min(split, q[ids[i], axis])
+        middle = _partition(ids, lo, hi, q, axis, split)
+        left, right = _new_cell(tree), _new_cell(tree)
+        tree.axis[cell], tree.split[cell] = axis, split
+        tree.child[cell, 0], tree.child[cell, 1] = left, right
+        tree.work[top, 0], tree.work[top, 1], tree.work[top, 2] = left, lo, middle
+        tree.work[top + 1, 0], tree.work[top + 1, 1], tree.work[top + 1, 2] = right, middle, hi
+        top += 2
 
 
 @inlined
-def _leaf_of(tree: KdTree, Q: Floats, row: int) -> int:
-    cell, depth = 0, 0
-    while tree.axis[cell] >= 0:
-        axis = tree.axis[cell]
-        cell = tree.child[cell, 1 if Q[row, axis] >= tree.split[cell] else 0]
-        depth += 1
-    tree.counts[_DEPTH] = max(tree.counts[_DEPTH], depth)
-    return cell
+def insert(tree: KdTree, space: Any, q: Floats, node: int) -> None:
+    """Add a node that stands at q[node]; the caller saw to it that the tree `has_room`.
 
-
-@inlined
-def insert(tree: KdTree, space: Any, node: int, Q: Floats, row: int) -> None:  # noqa: ANN401
-    """Add a node at Q[row]; the caller saw to it that the tree `has_room`.
-
-    A node that coincides with 16 others is left out: they answer for it.
+    A cell with 3/4 of its nodes on one side is rebuilt: trees grow outwards, and without this
+    their frontier would lie ever deeper (a scapegoat tree; Galperin and Rivest 1993). A node that
+    coincides with 16 others is left out: they answer for it.
     """
     d = len(space.lower)
-    cell = _leaf_of(tree, Q, row)
-    if tree.child[cell, 1] == BUCKET:
-        if not _split(tree, cell, d):
+    cell, lopsided = 0, -1
+    while tree.axis[cell] != _LEAF:
+        _stretch(tree, cell, q, node, d)
+        tree.size[cell] += 1
+        child = tree.child[cell, 1 if q[node, tree.axis[cell]] >= tree.split[cell] else 0]
+        if lopsided < 0 and 4 * tree.size[child] > 3 * tree.size[cell] + 4 * BUCKET:
+            lopsided = cell
+        cell = child
+    if tree.size[cell] == BUCKET:
+        if _widest_axis(tree, cell, d) < 0:
             return
-        cell = _leaf_of(tree, Q, row)
-    at = tree.child[cell, 0] * BUCKET + tree.child[cell, 1]
+        _rebuild(tree, q, cell, d)
+        _stretch(tree, cell, q, node, d)
+        tree.size[cell] += 1
+        cell = tree.child[cell, 1 if q[node, tree.axis[cell]] >= tree.split[cell] else 0]
+    at = tree.child[cell, 0] * BUCKET + tree.size[cell]
     for k in range(d):
-        tree.points[at, k] = Q[row, k]
+        tree.points[at, k] = q[node, k]
     tree.nodes[at] = node
-    tree.child[cell, 1] += 1
+    _stretch(tree, cell, q, node, d)
+    tree.size[cell] += 1
     tree.counts[_NODES] += 1
+    if lopsided >= 0:
+        _rebuild(tree, q, lopsided, d)
 
 
 @inlined
-def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:  # noqa: ANN401
-    """Return the node nearest to Q[row] in the robot's metric; -1 from an empty tree."""
+def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:
+    """Return the node nearest to Q[row] in the robot's metric.
+
+    Each cell knows the box around its nodes. The half-space that a split leaves would not do:
+    most samples lie far from a young tree, and its outer cells would have no end on that side.
+    """
+    stack, bounds = tree.stack, tree.stack_bound
     best, node, cell, top = np.inf, -1, 0, 0
     while True:
-        axis = tree.axis[cell]
-        if axis >= 0:
-            x, split = Q[row, axis], tree.split[cell]
-            side = 1 if x >= split else 0
-            bound = gap(space, axis, x, split)
-            if bound < best:
-                tree.stack[top], tree.stack_bound[top] = tree.child[cell, 1 - side], bound
+        if tree.axis[cell] != _LEAF:
+            close, far = tree.child[cell, 0], tree.child[cell, 1]
+            bound = box_measure(space, tree.low, tree.high, close, Q, row)
+            other = box_measure(space, tree.low, tree.high, far, Q, row)
+            if other < bound:
+                close, far, bound, other = far, close, other, bound
+            if other < best:
+                stack[top], bounds[top] = far, other
                 top += 1
-            cell = tree.child[cell, side]
-            continue
-        first = tree.child[cell, 0] * BUCKET
-        for at in range(first, first + tree.child[cell, 1]):
-            measured = measure(space, tree.points, at, Q, row)
-            if measured < best:
-                best, node = measured, tree.nodes[at]
-        while top > 0 and tree.stack_bound[top - 1] >= best:
+            if bound < best:
+                cell = close
+                continue
+        else:
+            first = tree.child[cell, 0] * BUCKET
+            for at in range(first, first + tree.size[cell]):
+                measured = measure(space, tree.points, at, Q, row)
+                if measured < best:
+                    best, node = measured, tree.nodes[at]
+        while top > 0 and bounds[top - 1] >= best:
             top -= 1
         if top == 0:
             return node
         top -= 1
-        cell = tree.stack[top]
+        cell = stack[top]

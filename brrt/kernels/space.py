@@ -1,8 +1,8 @@
 """Configuration space as kernels see it: a robot among obstacles, under one set of names.
 
-A robot's file defines a NamedTuple of arrays with the static kernels `measure`, `length`, `gap`,
-`interpolate` and `segment_free`; the functions of the same names here resolve to them when a
-planner is compiled, so a planner knows no robot and a robot no planner.
+A robot's file defines a NamedTuple of arrays with the static kernels `measure`, `length`,
+`box_measure`, `interpolate` and `segment_free`; the functions of the same names here resolve to
+them when a planner is compiled, so a planner knows no robot and a robot no planner.
 """
 
 from collections.abc import Callable
@@ -22,36 +22,36 @@ F = TypeVar("F", bound=Callable[..., Any])
 def _by_robot(function: F) -> F:
     """Let kernels that call `function` get the kernel of that name from the space's class."""
 
-    @overload(function, strict=False, jit_options=INLINED)
-    def resolve(space: Any, *rest: Any) -> Any:  # noqa: ANN401, ARG001 - numba's types are untyped
+    @overload(function, strict=False, jit_options=INLINED)  # type: ignore[arg-type]
+    def resolve(space: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
         if isinstance(space, types.BaseNamedTuple):
-            return getattr(space.instance_class, function.__name__).py_func
+            return getattr(space.instance_class, function.__name__).py_func  # type: ignore[attr-defined]
         return None
 
     return function
 
 
 @_by_robot
-def measure(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:  # noqa: ANN401
+def measure(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:
     """Return a number that grows with the distance of A[i] and B[j] and is cheap to compare."""
     return float(space.measure(space, A, i, B, j))
 
 
 @_by_robot
-def length(space: Any, measured: float) -> float:  # noqa: ANN401
+def length(space: Any, measured: float) -> float:
     """Return the distance that a `measure` stands for."""
     return float(space.length(space, measured))
 
 
 @_by_robot
-def gap(space: Any, axis: int, x: float, split: float) -> float:  # noqa: ANN401
-    """Return a lower bound of `measure` from coordinate x to anything beyond a split."""
-    return float(space.gap(space, axis, x, split))
+def box_measure(space: Any, low: Floats, high: Floats, b: int, Q: Floats, i: int) -> float:
+    """Return a lower bound of `measure` from Q[i] to anything between low[b] and high[b]."""
+    return float(space.box_measure(space, low, high, b, Q, i))
 
 
 @_by_robot
 def interpolate(
-    space: Any,  # noqa: ANN401
+    space: Any,
     A: Floats,
     i: int,
     B: Floats,
@@ -65,19 +65,19 @@ def interpolate(
 
 
 @_by_robot
-def segment_free(space: Any, A: Floats, i: int, B: Floats, j: int) -> bool:  # noqa: ANN401
+def segment_free(space: Any, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the motion from A[i] to B[j] is free of collisions, ends included."""
     return bool(space.segment_free(space, A, i, B, j))
 
 
 @inlined
-def distance(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:  # noqa: ANN401
+def distance(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:
     """Distance of A[i] and B[j] in the robot's metric."""
     return length(space, measure(space, A, i, B, j))
 
 
 @inlined
-def sample_uniform(space: Any, rng: np.random.Generator, out: Floats, row: int) -> None:  # noqa: ANN401
+def sample_uniform(space: Any, rng: np.random.Generator, out: Floats, row: int) -> None:
     """Draw a configuration evenly from the bounds into out[row]."""
     for k in range(len(space.lower)):
         low, high = space.lower[k], space.upper[k]
@@ -86,7 +86,7 @@ def sample_uniform(space: Any, rng: np.random.Generator, out: Floats, row: int) 
 
 @inlined
 def steer(
-    space: Any,  # noqa: ANN401
+    space: Any,
     A: Floats,
     i: int,
     B: Floats,

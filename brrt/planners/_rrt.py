@@ -46,7 +46,7 @@ class Tree(NamedTuple):
         q: Configuration of each node, shape (capacity, dof).
         parent: Parent of each node, shape (capacity,).
         cost: Cost-to-come of each node, shape (capacity,).
-        index: Nearest neighbours.
+        neighbours: Nearest neighbours.
         counts: Nodes, draws, counted iterations, the newest node while it is not yet tested for
             the goal or -1, the node at the goal or -1; shape (5,).
         scratch: The sample, the new node and the goal, shape (3, dof).
@@ -55,27 +55,27 @@ class Tree(NamedTuple):
     q: Floats
     parent: NDArray[np.int32]
     cost: Floats
-    index: KdTree
+    neighbours: KdTree
     counts: NDArray[np.int64]
     scratch: Floats
 
 
 @inlined
-def add(tree: Tree, space: Any, log: Buffer, parent: int, Q: Floats, row: int) -> int:  # noqa: ANN401
+def add(tree: Tree, space: Any, log: Buffer, parent: int, Q: Floats, row: int) -> int:
     """Join Q[row] to the tree below `parent`; return its number."""
-    node = tree.counts[NODES]
+    node = int(tree.counts[NODES])
     for k in range(len(space.lower)):
         tree.q[node, k] = Q[row, k]
     tree.parent[node] = parent
     tree.cost[node] = tree.cost[parent] + distance(space, tree.q, parent, Q, row)
-    insert(tree.index, space, node, Q, row)
+    insert(tree.neighbours, space, tree.q, node)
     tree.counts[NODES] += 1
     emit(log, EDGE, tree.counts[DRAWS], START_TREE, node, parent, tree.cost[node], Q, row)
     return node
 
 
 @inlined
-def extend(tree: Tree, space: Any, log: Buffer, near: int, options: Options) -> int:  # noqa: ANN401
+def extend(tree: Tree, space: Any, log: Buffer, near: int, options: Options) -> int:
     """Grow from `near` towards the sample by at most a step; return the new node, or -1."""
     scratch = tree.scratch
     moved = steer(space, tree.q, near, scratch, _DRAWN, options.step, scratch, _NEW)
@@ -99,7 +99,7 @@ def extend(tree: Tree, space: Any, log: Buffer, near: int, options: Options) -> 
 
 
 @inlined
-def reach_goal(tree: Tree, space: Any, log: Buffer, node: int, options: Options) -> bool:  # noqa: ANN401
+def reach_goal(tree: Tree, space: Any, log: Buffer, node: int, options: Options) -> bool:
     """Try to join the goal to the newest node, as the goal test allows."""
     scratch = tree.scratch
     far = distance(space, tree.q, node, scratch, _TARGET)
@@ -119,7 +119,7 @@ def reach_goal(tree: Tree, space: Any, log: Buffer, node: int, options: Options)
 @inlined
 def iterate(
     tree: Tree,
-    space: Any,  # noqa: ANN401
+    space: Any,
     rng: np.random.Generator,
     log: Buffer,
     options: Options,
@@ -132,7 +132,7 @@ def iterate(
     while True:
         if room(log) < options.slices + 3:
             return BATCH_FULL
-        if counts[NODES] + options.slices + 1 > len(tree.parent) or not has_room(tree.index):
+        if counts[NODES] + options.slices + 1 > len(tree.parent) or not has_room(tree.neighbours):
             return TREE_FULL
         if newest >= 0:
             counts[UNTESTED] = -1
@@ -148,7 +148,7 @@ def iterate(
         else:
             sample_uniform(space, rng, scratch, _DRAWN)
         emit(log, SAMPLE, counts[DRAWS], START_TREE, source, 0, 0.0, scratch, _DRAWN)
-        near = nearest(tree.index, space, scratch, _DRAWN)
+        near = nearest(tree.neighbours, space, scratch, _DRAWN)
         newest = extend(tree, space, log, near, options)
         counts[UNTESTED] = newest
         if newest >= 0 or options.count_failed:
@@ -158,7 +158,7 @@ def iterate(
 @kernel
 def advance(
     tree: Tree,
-    space: Any,  # noqa: ANN401
+    space: Any,
     rng: np.random.Generator,
     log: Buffer,
     options: Options,

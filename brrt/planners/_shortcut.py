@@ -19,7 +19,7 @@ WAYPOINTS, ATTEMPTS = range(2)
 
 
 @inlined
-def path_cost(path: Floats, n: int, space: Any) -> float:  # noqa: ANN401
+def path_cost(path: Floats, n: int, space: Any) -> float:
     """Length of the first n waypoints, summed from the start."""
     cost = 0.0
     for i in range(1, n):
@@ -32,7 +32,7 @@ def attempt_all(
     path: Floats,
     counts: NDArray[np.int64],
     cost: Floats,
-    space: Any,  # noqa: ANN401
+    space: Any,
     rng: np.random.Generator,
     log: Buffer,
     iteration: int,
@@ -63,7 +63,7 @@ def shorten(
     path: Floats,
     counts: NDArray[np.int64],
     cost: Floats,
-    space: Any,  # noqa: ANN401
+    space: Any,
     rng: np.random.Generator,
     log: Buffer,
     iteration: int,

@@ -47,7 +47,7 @@ class RRT(Planner):
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
-        space = problem.space()
+        space = problem.space
         options = _rrt.Options(
             step=self.step or 0.05 * problem.world.extent,
             goal_bias=self.goal_bias,
@@ -81,7 +81,7 @@ class RRT(Planner):
             if result == _rrt.BATCH_FULL:
                 yield log.drain()
         iteration = int(counts[_rrt.DRAWS])
-        if log.room < 2:  # noqa: PLR2004 - the path and the end of the phase
+        if log.room < 2:
             yield log.drain()
         if status is Status.SOLVED:
             goal = int(counts[_rrt.GOAL_NODE])
@@ -100,7 +100,7 @@ def _planted_tree(problem: Problem, capacity: int) -> _rrt.Tree:
         q=np.empty((capacity, dof)),
         parent=np.empty(capacity, np.int32),
         cost=np.empty(capacity),
-        index=rooted_kdtree(problem.start, capacity),
+        neighbours=rooted_kdtree(problem.start, capacity),
         counts=np.array([1, 0, 0, 0, -1]),
         scratch=np.array([problem.start, problem.start, problem.goal]),
     )
@@ -115,7 +115,7 @@ def _grown_tree(tree: _rrt.Tree) -> _rrt.Tree:
     for new, old in zip((q, parent, cost), tree[:3], strict=True):
         new[:n] = old[:n]
     return _rrt.Tree(
-        q, parent, cost, grown_kdtree(tree.index, capacity), tree.counts, tree.scratch
+        q, parent, cost, grown_kdtree(tree.neighbours, capacity), tree.counts, tree.scratch
     )
 
 

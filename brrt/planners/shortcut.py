@@ -26,7 +26,7 @@ class Shortcut(Settings):
     def smooth(
         self,
         path: NDArray[np.float64],
-        space: Any,  # noqa: ANN401 - each robot has its own type
+        space: Any,
         rng: np.random.Generator,
         log: EventLog,
         stop: Stop,
@@ -42,7 +42,7 @@ class Shortcut(Settings):
             stop: Interruption; the planner's budget does not count here.
             iteration: The planner's count, for the events.
         """
-        if log.room < 3:  # noqa: PLR2004 - phase, path, phase
+        if log.room < 3:
             yield log.drain()
         log.emit(Kind.PHASE, iteration, name=Phase.SMOOTH, status=Status.BEGIN)
         points, counts, cost = path.copy(), np.array([len(path), 0]), np.zeros(1)
@@ -52,9 +52,9 @@ class Shortcut(Settings):
                 points, counts, cost, space, rng, log.buffer, iteration, self.attempts
             )
             waypoints, made = (int(n) for n in counts)
-            if log.room < 2:  # noqa: PLR2004 - path, phase
+            if log.room < 2:
                 yield log.drain()
-            if stop.interrupted or made >= self.attempts or waypoints <= 2:  # noqa: PLR2004
+            if stop.interrupted or made >= self.attempts or waypoints <= 2:
                 break
         log.emit(
             Kind.PATH,

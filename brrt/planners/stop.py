@@ -48,7 +48,9 @@ def stop_on_signals(stop: Stop) -> Iterator[None]:
             raise KeyboardInterrupt
         stop.interrupted = True
 
-    before = {number: signal.signal(number, raise_flag) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {
+        number: signal.signal(number, raise_flag) for number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:

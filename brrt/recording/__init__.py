@@ -1,0 +1,34 @@
+"""Recordings: sinks that write them, and `read` for what they wrote."""
+
+from pathlib import Path
+
+from brrt.errors import RecordingError
+from brrt.recording.mcap_reader import CutError, read_mcap
+from brrt.recording.mcap_writer import MAGIC, McapSink
+from brrt.recording.memory import Memory
+from brrt.recording.recording import Recording
+
+_RRD = b"RRF"
+
+
+def read(path: Path) -> Recording:
+    """Open a recording, MCAP or Rerun, told apart by how the file begins.
+
+    Raises:
+        RecordingError: The file cannot be read, or is not a recording of brrt.
+    """
+    try:
+        with path.open("rb") as file:
+            begin = file.read(len(MAGIC))
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}") from None
+    if begin == MAGIC:
+        return read_mcap(path)
+    if begin.startswith(_RRD):
+        from brrt.recording.rerun import read_rerun  # noqa: PLC0415 - costs half a second
+
+        return read_rerun(path)
+    raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
+
+
+__all__ = ["CutError", "McapSink", "Memory", "Recording", "read", "read_mcap"]

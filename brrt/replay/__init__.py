@@ -1,0 +1,1 @@
+"""Folds over events: the forest, the figures, the first difference."""

@@ -29,6 +29,26 @@ class Tree:
     def __len__(self) -> int:
         return len(self.parent)
 
+    @property
+    def leaves(self) -> int:
+        """Nodes that are nobody's parent."""
+        return len(self) - len(np.unique(self.parent[self.parent >= 0]))
+
+    @property
+    def depth(self) -> int:
+        """Edges from the root to the deepest node."""
+        up = self.parent.copy()
+        # Each round halves what is left of every way up: log2(depth) rounds.
+        steps = (up >= 0).astype(np.int64)
+        while (up >= 0).any():
+            on_way = np.flatnonzero(up >= 0)
+            above = up[on_way]
+            steps[on_way] += steps[above]
+            up[on_way] = up[above]
+            if steps.max() > len(self):
+                raise RecordingError("a node is its own ancestor")
+        return int(steps.max(initial=0))
+
     def path_to(self, node: int) -> NDArray[np.float64]:
         """Configurations from the root to a node, shape (m, dof).
 

@@ -46,9 +46,15 @@ class PointSpace(NamedTuple):
 
     @staticmethod
     @inlined
-    def gap(space: "PointSpace", axis: int, x: float, split: float) -> float:  # noqa: ARG004
-        """Square of the distance along one axis."""
-        return (x - split) * (x - split)
+    def box_measure(
+        space: "PointSpace", low: Floats, high: Floats, b: int, Q: Floats, i: int
+    ) -> float:
+        """Square of the distance to a box."""
+        total = 0.0
+        for k in range(len(space.lower)):
+            outside = max(0.0, low[b, k] - Q[i, k], Q[i, k] - high[b, k])
+            total += outside * outside
+        return total
 
     @staticmethod
     @inlined

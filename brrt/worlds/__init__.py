@@ -83,13 +83,13 @@ def load_world(path: Path) -> World:
         return LOADERS[path.suffix](path, text)
     except BrrtError as error:
         message = str(error)
-        raise BrrtError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+        raise BrrtError(
+            message if message.startswith(str(path)) else f"{path}: {message}"
+        ) from None
 
 
 def _named(name: str, world: World) -> World:
-    return World(
-        name, world.lower, world.upper, world.balls, world.boxes, world.start, world.goal
-    )
+    return World(name, world.lower, world.upper, world.balls, world.boxes, world.start, world.goal)
 
 
 def _pairs(spec: str, text: str) -> dict[str, str]:

@@ -104,7 +104,7 @@ class Balls(Generator):
     def covers(self, centres: Floats, halves: Floats, point: Floats) -> NDArray[np.bool_]:
         """Compare the distance to the centre with radius and clearance."""
         reach = halves[:, 0] + _CLEARANCE * self.size
-        return ((centres - point) ** 2).sum(axis=1) <= reach**2
+        return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
     def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
         """Write each ball as centre and radius."""

@@ -16,7 +16,7 @@ SCHEMA, VERSION = "brrt.world", 1
 Floats = NDArray[np.float64]
 
 
-def _rows(name: str, values: Any, width: int) -> Floats:  # noqa: ANN401 - from JSON or a user
+def _rows(name: str, values: Any, width: int) -> Floats:
     try:
         array = np.array(values, dtype=np.float64)
         array = array.reshape(-1, width) if array.size else np.empty((0, width))

@@ -1,0 +1,56 @@
+"""Write while planning: a sink on a thread of its own."""
+
+import queue
+import threading
+
+from brrt.events import Events
+from brrt.run import Sink
+
+_BATCHES = 4
+"""Batches in waiting; a planner that is faster than the disk waits for it."""
+
+
+class Background:
+    """Hands batches to another sink on a thread; kernels run without the GIL meanwhile.
+
+    What the sink raises is raised again by the next call here.
+
+    Args:
+        sink: The sink that does the work.
+    """
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self._queue: queue.Queue[Events | None] = queue.Queue(_BATCHES)
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._work, name="brrt recorder", daemon=True)
+        self._thread.start()
+
+    def write(self, events: Events) -> None:
+        """Queue a batch."""
+        self._raise()
+        self._queue.put(events)
+
+    def close(self, *, whole: bool) -> None:
+        """Wait for what is queued, then close the sink."""
+        self._queue.put(None)
+        self._thread.join()
+        try:
+            self._raise()
+        except BaseException:
+            self._sink.close(whole=False)
+            raise
+        self._sink.close(whole=whole)
+
+    def _work(self) -> None:
+        while (events := self._queue.get()) is not None:
+            if self._error is None:
+                try:
+                    self._sink.write(events)
+                except BaseException as error:  # noqa: BLE001 - raised again on the caller's thread
+                    self._error = error
+
+    def _raise(self) -> None:
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error

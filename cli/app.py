@@ -1,0 +1,79 @@
+"""The `brrt` command: its commands, and how errors become one line."""
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from .console import Code, complain
+from .lists import planners, robots, worlds
+from .plan import plan
+from .replay import replay
+
+app = typer.Typer(
+    name="brrt",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="""The flight recorder for motion planners.
+
+Run a planner, record every sample, rejection, edge and path with its time, look inside, replay.
+
+[bold]brrt plan[/bold] plans in a random world and writes run.mcap and run.rrd
+
+[bold]brrt replay run.mcap[/bold] rebuilds the run's figures and trees from the file alone
+
+[bold]rerun run.rrd[/bold] shows the tree as it grows
+
+[bold]brrt planners[/bold] lists what there is to set
+
+Exit codes: 0 solved, equal; 1 no path, differs; 2 bad input; 130 interrupted.""",
+)
+
+app.command()(plan)
+app.command()(replay)
+app.command()(planners)
+app.command()(robots)
+app.command()(worlds)
+
+
+@app.callback(invoke_without_command=True)
+def options(
+    version: bool = typer.Option(False, "--version", help="Print the version and leave."),
+) -> None:
+    """See the help of `app`."""
+    if version:
+        from importlib.metadata import version as version_of  # noqa: PLC0415
+
+        typer.echo(version_of("brrt"))
+        raise typer.Exit
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the command line; bad input is one line on stderr and exit code 2."""
+    sys.exit(_run(args))
+
+
+def _run(args: Sequence[str] | None) -> int:
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+
+    try:
+        return int(app(args, prog_name="brrt", standalone_mode=False) or 0)
+    except BrrtError as error:
+        complain(str(error))
+    except typer.Abort:
+        return Code.INTERRUPTED
+    except KeyboardInterrupt:
+        return Code.INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output has gone: nothing more to say, and nothing to say it to.
+        sys.stdout = None
+        return Code.FAILED
+    except Exception as error:
+        # Wrong usage: typer brings its own copy of click, whose classes have no public name.
+        usage = getattr(error, "format_message", None)
+        if usage is None:
+            raise
+        complain(f"{usage()} (see brrt --help)")
+    return Code.BAD_INPUT

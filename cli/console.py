@@ -1,0 +1,131 @@
+"""What the command line prints, and how it ends."""
+
+import json
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from enum import IntEnum
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+class Code(IntEnum):
+    """Exit codes."""
+
+    DONE = 0
+    FAILED = 1
+    BAD_INPUT = 2
+    INTERRUPTED = 130
+
+
+def complain(message: str) -> None:
+    """Print one line on stderr."""
+    err.print("brrt: " + " ".join(message.split()), style="red", markup=False, soft_wrap=True)
+
+
+def note(message: str) -> None:
+    """Print one line on stderr that is no error."""
+    err.print("brrt: " + message, style="dim", markup=False, soft_wrap=True)
+
+
+def print_json(data: Mapping[str, Any]) -> None:
+    """Print one object on stdout, as plain text."""
+    sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
+
+
+def print_rows(rows: Sequence[Mapping[str, str]], title: str | None = None) -> None:
+    """Print a table of rows with the same keys."""
+    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
+    for i, name in enumerate(rows[0]):
+        table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < 2)
+    for row in rows:
+        table.add_row(*(row[name] for name in row))
+    out.print(table)
+
+
+def print_summary(figures: Mapping[str, Any]) -> None:
+    """Print a run's figures for people."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column(overflow="fold")
+    for name, text in _summary(figures):
+        style = {"solved": "bold green", "not solved": "bold red"}.get(text.split(",")[0], "")
+        table.add_row(name, text, style=style if name == "outcome" else "")
+    out.print(table)
+
+
+def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "run", f"{f['planner']} · {f['robot']} · {f['world']} · seed {f['seed']}"
+    yield "outcome", ("solved" if f["solved"] else f"not solved, {f['status']}")
+    time = "" if f["plan_time_s"] is None else f" in {seconds(f['plan_time_s'])}"
+    yield "planned", f"{f['iterations']:,} iterations{time}"
+    rejected = f["rejects"] / f["samples"] if f["samples"] else 0.0
+    counts = f"{f['samples']:,} samples, {f['nodes']:,} nodes, {f['rejects']:,} rejected"
+    yield "recorded", f"{f['events']:,} events: {counts} ({rejected:.0%})"
+    if f["path"] is not None:
+        yield "path", f"cost {f['path_cost']:.6g}, {len(f['path']) - 1} moves"
+    if f["smoothed_path"] is not None:
+        saved = 1 - f["smoothed_cost"] / f["path_cost"] if f["path_cost"] else 0.0
+        moves = len(f["smoothed_path"]) - 1
+        effort = f"{f['shortcuts']} attempts in {seconds(f['smooth_time_s'])}"
+        yield (
+            "smoothed",
+            f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {moves} moves, {effort}",
+        )
+
+
+def seconds(value: float) -> str:
+    """Write a duration in the unit that suits it."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value * 1e9:.0f} ns"
+
+
+class Watch:
+    """A progress bar that appears once a job has lasted a second, on a terminal alone.
+
+    Args:
+        total: Where the bar ends.
+        waiting: What it says until the first `update`.
+    """
+
+    def __init__(self, total: float, waiting: str) -> None:
+        self._progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[figures]}"),
+            TimeElapsedColumn(),
+            console=err,
+            transient=True,
+        )
+        self._task = self._progress.add_task(waiting, total=None, figures="")
+        self._total = total
+        self._timer = threading.Timer(1.0, self._progress.start)
+        self._timer.daemon = True
+
+    @contextmanager
+    def running(self) -> Iterator["Watch"]:
+        """Show the bar while the body runs, if it takes long."""
+        if err.is_terminal:
+            self._timer.start()
+        try:
+            yield self
+        finally:
+            self._timer.cancel()
+            if err.is_terminal and self._progress.live.is_started:
+                self._progress.stop()
+
+    def update(self, done: float, what: str, figures: str) -> None:
+        """Say how far the job is."""
+        self._progress.update(
+            self._task, completed=done, total=self._total, description=what, figures=figures
+        )

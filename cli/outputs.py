@@ -1,0 +1,26 @@
+"""Which files a command writes: checked before anything is written."""
+
+import os
+from pathlib import Path
+
+from brrt.errors import BrrtError
+
+
+def check_output(path: Path | None, option: str, suffix: str, *, force: bool) -> None:
+    """See that a file can be written.
+
+    Raises:
+        BrrtError: The name, the folder or what stands there already forbids it.
+    """
+    if path is None:
+        return
+    if path.suffix != suffix:
+        raise BrrtError(f"{option} {path}: the name must end in {suffix}")
+    if not path.parent.is_dir():
+        raise BrrtError(f"{option} {path}: there is no folder {path.parent}; make it first")
+    if path.is_dir():
+        raise BrrtError(f"{option} {path}: is a folder")
+    if path.exists() and not force:
+        raise BrrtError(f"{option} {path}: exists already; choose another name or add --force")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise BrrtError(f"{option} {path}: no permission to write there")

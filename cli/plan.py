@@ -1,0 +1,215 @@
+"""`brrt plan`: run a planner and record it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import Code, Watch, note, out, print_json, print_summary
+
+if TYPE_CHECKING:
+    from brrt.replay.metrics import Metrics
+    from brrt.run import Run, Sink
+    from brrt.scenario import Scenario
+
+
+def plan(
+    scenario: Annotated[
+        Path | None, typer.Argument(help="A TOML file with the settings below; options win.")
+    ] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(
+            help="A generator with parameters, as circles2d:n=80,seed=3, or a file. "
+            "Default circles2d; brrt worlds lists them.",
+            rich_help_panel="Problem",
+        ),
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="Default point.", rich_help_panel="Problem")
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            help="Start configuration, as 5,5 or 1,2,3.",
+            metavar="X,Y[,Z]",
+            rich_help_panel="Problem",
+        ),
+    ] = None,
+    goal: Annotated[
+        str | None,
+        typer.Option(help="Goal configuration.", metavar="X,Y[,Z]", rich_help_panel="Problem"),
+    ] = None,
+    planner: Annotated[
+        str | None,
+        typer.Option(help="Default rrt; brrt planners lists them.", rich_help_panel="Planner"),
+    ] = None,
+    param: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A planner's parameter, as step=2; may be repeated.",
+            metavar="NAME=VALUE",
+            rich_help_panel="Planner",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="Seed of every random draw. Default 0.", rich_help_panel="Planner"),
+    ] = None,
+    iterations: Annotated[
+        int | None,
+        typer.Option(
+            help="Iterations before giving up. Default 1000000.", rich_help_panel="Planner"
+        ),
+    ] = None,
+    time: Annotated[
+        float | None,
+        typer.Option(help="Seconds before giving up. Default none.", rich_help_panel="Planner"),
+    ] = None,
+    smooth: Annotated[
+        bool | None,
+        typer.Option(
+            "--smooth/--no-smooth",
+            help="Shortcut the path. Default yes.",
+            rich_help_panel="Planner",
+            show_default=False,
+        ),
+    ] = None,
+    shortcuts: Annotated[
+        int | None,
+        typer.Option(help="Attempts of the smoother. Default 100.", rich_help_panel="Planner"),
+    ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Write the MCAP recording here. Default run.mcap, with run.rrd beside it, "
+            "where neither --out nor --rrd is given.",
+            rich_help_panel="Recording",
+        ),
+    ] = None,
+    rrd: Annotated[
+        Path | None,
+        typer.Option(help="Write the Rerun recording here.", rich_help_panel="Recording"),
+    ] = None,
+    record: Annotated[
+        bool, typer.Option("--record/--no-record", help="Write files.", rich_help_panel="Recording")
+    ] = True,
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite files.", rich_help_panel="Recording")
+    ] = False,
+    view: Annotated[
+        bool,
+        typer.Option(
+            "--view", help="Watch it live in the Rerun viewer.", rich_help_panel="Recording"
+        ),
+    ] = False,
+    clock: Annotated[
+        str | None,
+        typer.Option(
+            help="real, or logical: event n at n us, so that the file is the same in each run.",
+            rich_help_panel="Recording",
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
+    ] = False,
+) -> None:
+    """Run a planner in a world and record every event.
+
+    brrt plan
+
+    brrt plan --world squares2d:n=120,seed=4 --seed 7 --param step=2 --out seven.mcap
+
+    brrt plan --world map.txt --start 0,0,1 --goal 12,12,5 --time 10 --view
+
+    brrt plan experiment.toml --seed 3 --json
+    """
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.planners.stop import stop_on_signals  # noqa: PLC0415
+    from brrt.run import Run  # noqa: PLC0415
+
+    from .outputs import check_output  # noqa: PLC0415
+
+    if not record and (mcap or rrd):
+        raise BrrtError("--no-record contradicts --out and --rrd; leave one of them out")
+    if record and mcap is None and rrd is None:
+        mcap, rrd = Path("run.mcap"), Path("run.rrd")
+    check_output(mcap, "--out", ".mcap", force=force)
+    check_output(rrd, "--rrd", ".rrd", force=force)
+    given = {
+        "world": world, "robot": robot, "start": start, "goal": goal, "planner": planner,
+        "seed": seed, "iterations": iterations, "time": time, "smooth": smooth,
+        "shortcuts": shortcuts, "clock": clock,
+    }  # fmt: skip
+    settings = _merged(scenario, given, param or [])
+    _warn_of_compiling()
+    with Watch(settings.iterations, "preparing the planner").running() as watch:
+        run = Run(settings)
+        with stop_on_signals(run.stop):
+            metrics = run.execute(_sinks(run, mcap, rrd, view=view), lambda m: _show(m, watch))
+    _report(metrics, mcap, rrd, as_json=as_json)
+    if run.stop.interrupted:
+        raise typer.Exit(Code.INTERRUPTED)
+    if not metrics.solved:
+        raise typer.Exit(Code.FAILED)
+
+
+def _merged(file: Path | None, given: dict[str, Any], params: list[str]) -> "Scenario":
+    """Put what was given on the command line on top of the file, if there is one."""
+    from brrt.errors import BrrtError  # noqa: PLC0415
+    from brrt.scenario import Scenario  # noqa: PLC0415
+
+    base = Scenario() if file is None else Scenario.load(file)
+    values = {**base.as_dict(), **{k: v for k, v in given.items() if v is not None}}
+    if values["planner"] != base.planner:
+        values["params"] = {}
+    for text in params:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise BrrtError(f"--param {text!r} must read name=value, as step=2")
+        values["params"] = {**values["params"], name.strip(): value.strip()}
+    return Scenario.parse(values)
+
+
+def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> list["Sink"]:
+    from brrt.recording import McapSink  # noqa: PLC0415
+    from brrt.recording.background import Background  # noqa: PLC0415
+
+    world, sinks = run.problem.world, list["Sink"]()
+    if mcap is not None:
+        sinks.append(Background(McapSink(mcap, run.manifest, world)))
+    if rrd is not None or view:
+        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
+
+        sinks.append(Background(RerunSink(run.manifest, world, path=rrd, view=view)))
+    return sinks
+
+
+def _warn_of_compiling() -> None:
+    from brrt.kernels.jit import is_cold  # noqa: PLC0415
+
+    if is_cold():
+        note("compiling the planner for this machine, once (about 15 s)")
+
+
+def _show(metrics: "Metrics", watch: Watch) -> None:
+    figures = metrics.as_dict()
+    cost = "" if figures["path_cost"] is None else f", cost {figures['path_cost']:.4g}"
+    watch.update(
+        metrics.iterations,
+        figures["planner"],
+        f"{metrics.iterations:,} iterations, {figures['nodes']:,} nodes{cost}",
+    )
+
+
+def _report(metrics: "Metrics", mcap: Path | None, rrd: Path | None, *, as_json: bool) -> None:
+    figures = metrics.as_dict()
+    if as_json:
+        print_json(figures)
+        return
+    print_summary(figures)
+    if mcap is not None:
+        out.print(f"\n{mcap}: look inside with [bold]brrt replay {mcap}[/bold]")
+    if rrd is not None:
+        out.print(f"{rrd}: watch it with [bold]rerun {rrd}[/bold]")

@@ -1,0 +1,197 @@
+"""`brrt replay`: a run's figures and trees, from its recording alone."""
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import Code, note, out, print_json, print_rows, print_summary
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from brrt.events import Events
+    from brrt.recording import Recording
+
+
+def replay(
+    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
+    at: Annotated[
+        str | None,
+        typer.Option(
+            help="As it stood at this time of the run, as 1.5s, 20ms or 300us.",
+            metavar="TIME",
+            rich_help_panel="Instant",
+        ),
+    ] = None,
+    at_event: Annotated[
+        int | None,
+        typer.Option(help="As it stood after this event.", rich_help_panel="Instant"),
+    ] = None,
+    at_iteration: Annotated[
+        int | None,
+        typer.Option(help="As it stood after this iteration.", rich_help_panel="Instant"),
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(
+            help="Compare with another recording, event by event without the times; "
+            "exit 1 at the first difference.",
+            metavar="GOLDEN",
+        ),
+    ] = None,
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording of it.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object, as plan --json did.")
+    ] = False,
+) -> None:
+    """Rebuild the trees and the figures of a run from its recording.
+
+    brrt replay run.mcap
+
+    brrt replay run.mcap --at 20ms
+
+    brrt replay run.mcap --check recordings/circles2d-rrt.mcap
+
+    brrt replay run.mcap --at-iteration 400 --rrd first400.rrd
+    """
+    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+    from brrt.replay.metrics import Metrics  # noqa: PLC0415
+
+    from .outputs import check_output  # noqa: PLC0415
+
+    check_output(rrd, "--rrd", ".rrd", force=force)
+    limits = _limits(at, at_event, at_iteration)
+    recording = read(run)
+    metrics = Metrics(recording.manifest)
+    trees = _Trees()
+    sinks: list[Any] = [metrics] if as_json else [metrics, trees]
+    _feed(recording, sinks, limits, partial=partial)
+    if rrd is not None:
+        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
+
+        sink = RerunSink(recording.manifest, recording.world, path=rrd)
+        try:
+            _feed(recording, [sink], limits, partial=partial)
+        finally:
+            sink.close(whole=recording.result is not None and not limits)
+    difference = None if check is None else _difference(recording, check, partial=partial)
+    figures = metrics.as_dict()
+    if as_json:
+        verdict = {} if check is None else {"check": {"equal": not difference, "first": difference}}
+        print_json({**figures, **verdict})
+    else:
+        print_summary(figures)
+        trees.show()
+        if check is not None:
+            out.print(difference or f"equal to {check}, event by event", markup=False)
+    if difference:
+        raise typer.Exit(Code.FAILED)
+
+
+def _limits(at: str | None, event: int | None, iteration: int | None) -> dict[str, int]:
+    """Return the instant asked for, as `Events.until` takes it."""
+    from brrt.errors import BrrtError  # noqa: PLC0415
+
+    given = {"t": at, "seq": event, "iteration": iteration}
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if len(chosen) > 1:
+        raise BrrtError("give one of --at, --at-event and --at-iteration")
+    if at is not None:
+        return {"t": _nanoseconds(at)}
+    limits = {name: int(value) for name, value in chosen.items()}
+    if any(value < 0 for value in limits.values()):
+        raise BrrtError("--at-event and --at-iteration count from 0")
+    return limits
+
+
+def _nanoseconds(text: str) -> int:
+    from brrt.errors import BrrtError  # noqa: PLC0415
+
+    match = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*(s|ms|us|ns)?", text.strip())
+    if match is None:
+        raise BrrtError(f"--at must be a time like 1.5s, 20ms or 300us, not {text!r}")
+    unit = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}[match[2] or "s"]
+    return int(float(match[1]) * unit)
+
+
+def _feed(
+    recording: "Recording", sinks: list[Any], limits: dict[str, int], *, partial: bool
+) -> None:
+    """Hand the events up to the limits to the sinks."""
+    for batch in _whole(recording, partial=partial):
+        part = batch.until(**limits) if limits else batch
+        for sink in sinks:
+            sink.write(part)
+        if len(part) < len(batch):
+            break
+
+
+def _whole(recording: "Recording", *, partial: bool) -> "Iterator[Events]":
+    """Yield the batches; where the file is cut, say what was saved."""
+    from brrt.errors import RecordingError  # noqa: PLC0415
+    from brrt.recording import CutError  # noqa: PLC0415
+
+    events, last = 0, 0
+    try:
+        for batch in recording.batches():
+            events += len(batch)
+            last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
+            yield batch
+    except CutError as error:
+        saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
+        if not partial:
+            raise RecordingError(f"{error}; {saved}: replay them with --partial") from None
+        note(f"{error}; {saved}")
+
+
+def _difference(recording: "Recording", golden: Path, *, partial: bool) -> str | None:
+    from brrt.recording import read  # noqa: PLC0415
+    from brrt.replay.diff import first_difference  # noqa: PLC0415
+
+    found = first_difference(
+        _whole(recording, partial=partial), _whole(read(golden), partial=False)
+    )
+    return None if found is None else str(found)
+
+
+class _Trees:
+    """Gathers what the forest is rebuilt from."""
+
+    def __init__(self) -> None:
+        self._batches: list[Events] = []
+        self._dof = 0
+
+    def write(self, events: "Events") -> None:
+        """Keep the edges."""
+        from brrt.events import Events, Kind  # noqa: PLC0415
+
+        self._dof = events.dof
+        edges = events[Kind.EDGE]
+        if len(edges):
+            self._batches.append(Events(events.dof, {Kind.EDGE: edges}))
+
+    def show(self) -> None:
+        """Print a line a tree."""
+        from brrt.events import Events  # noqa: PLC0415
+        from brrt.replay.forest import forest  # noqa: PLC0415
+
+        trees = forest(Events.concat(self._dof, self._batches))
+        rows = [
+            {
+                "tree": str(number),
+                "nodes": f"{len(tree):,}",
+                "leaves": f"{tree.leaves:,}",
+                "depth": f"{tree.depth:,}",
+                "greatest cost-to-come": f"{tree.cost.max():.6g}",
+            }
+            for number, tree in trees.items()
+        ]
+        if rows:
+            out.print()
+            print_rows(rows)

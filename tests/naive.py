@@ -1,0 +1,139 @@
+"""Slow twins: exact, brute force, obvious at a glance. The other tests hold brrt to them.
+
+Floats are rational numbers, so `Fraction` decides every question about them without rounding.
+"""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Events
+from brrt.worlds import World
+
+Floats = NDArray[np.float64]
+Point = Sequence[float] | Floats
+
+NEAR = 1e-9
+"""A hit that is none must be a miss by less than this part of the lengths at hand."""
+
+
+def exact(values: Point) -> list[Fraction]:
+    """The same numbers, as fractions."""
+    return [Fraction(float(value)) for value in values]
+
+
+def segment_hits_box(a: Point, b: Point, box: Point, margin: float = 0.0) -> bool:
+    """Whether the closed segment a b touches a closed box, widened by a margin on every side."""
+    d = len(a)
+    p, q, corners, more = exact(a), exact(b), exact(box), Fraction(margin)
+    enter, leave = Fraction(0), Fraction(1)
+    for x, y, low, high in zip(p, q, corners[:d], corners[d:], strict=True):
+        if x == y:
+            if not low - more <= x <= high + more:
+                return False
+        else:
+            u, v = (low - more - x) / (y - x), (high + more - x) / (y - x)
+            enter, leave = max(enter, min(u, v)), min(leave, max(u, v))
+    return enter <= leave
+
+
+def segment_hits_ball(a: Point, b: Point, ball: Point, margin: float = 0.0) -> bool:
+    """Whether the closed segment a b touches a closed ball, its radius increased by a margin."""
+    d = len(a)
+    p, q, (*centre, radius) = exact(a), exact(b), exact(ball)
+    along = [q[k] - p[k] for k in range(d)]
+    offset = [centre[k] - p[k] for k in range(d)]
+    length_squared = sum(x * x for x in along)
+    part = Fraction(0)
+    if length_squared:
+        part = sum(x * y for x, y in zip(along, offset, strict=True)) / length_squared
+    part = min(max(part, Fraction(0)), Fraction(1))
+    gap = [offset[k] - part * along[k] for k in range(d)]
+    return sum(x * x for x in gap) <= (radius + Fraction(margin)) ** 2
+
+
+def hits(world: World, a: Point, b: Point) -> bool:
+    """Whether the closed segment a b touches an obstacle."""
+    boxes, balls = _close_to(world, a, b)
+    return any(segment_hits_box(a, b, box) for box in boxes) or any(
+        segment_hits_ball(a, b, ball) for ball in balls
+    )
+
+
+def nearly_hits(world: World, a: Point, b: Point) -> bool:
+    """Whether the segment a b touches an obstacle that is widened by `NEAR` of the lengths at hand.
+
+    For each obstacle that is the longest side of the box around the obstacle and the segment.
+    """
+    d, ends = world.dim, np.array([a, b], dtype=np.float64)
+    for box in world.boxes:
+        if segment_hits_box(a, b, box, NEAR * np.ptp([*ends, box[:d], box[d:]], axis=0).max()):
+            return True
+    for ball in world.balls:
+        around = [*ends, ball[:d] - ball[d], ball[:d] + ball[d]]
+        if segment_hits_ball(a, b, ball, NEAR * np.ptp(around, axis=0).max()):
+            return True
+    return False
+
+
+def _close_to(world: World, a: Point, b: Point) -> tuple[Floats, Floats]:
+    """Boxes and balls whose bounding box meets the segment's: the others cannot touch it.
+
+    Comparisons do not round; the bounding box of a ball does, so it is made an ulp too large.
+    """
+    d, (low, high) = world.dim, np.sort([a, b], axis=0)
+    boxes, balls = world.boxes, world.balls
+    least = np.nextafter(balls[:, :d] - balls[:, d:], -np.inf)
+    most = np.nextafter(balls[:, :d] + balls[:, d:], np.inf)
+    return (
+        boxes[((boxes[:, :d] <= high) & (low <= boxes[:, d:])).all(axis=1)],
+        balls[((least <= high) & (low <= most)).all(axis=1)],
+    )
+
+
+def motions(waypoints: Sequence[Point] | Floats) -> Iterator[tuple[Point, Point]]:
+    """Each waypoint with its successor; a lone waypoint with itself."""
+    return zip(waypoints, waypoints[1:] if len(waypoints) > 1 else waypoints, strict=False)
+
+
+def path_is_free(world: World, waypoints: Sequence[Point] | Floats) -> bool:
+    """Whether a path has waypoints, stays within the bounds and touches no obstacle."""
+    return (
+        len(waypoints) > 0
+        and all(map(world.inside, waypoints))
+        and not any(hits(world, a, b) for a, b in motions(waypoints))
+    )
+
+
+def squared_distances(points: Floats, q: Floats) -> Floats:
+    """Squares of the distances from each point, shape (n, d), to q, summed axis by axis."""
+    total = np.zeros(len(points))
+    for k in range(len(q)):
+        total = total + (points[:, k] - q[k]) ** 2
+    return total
+
+
+def path_length(waypoints: Floats) -> float:
+    """Sum of the Euclidean lengths of a path's motions, from the start on."""
+    total = 0.0
+    for a, b in zip(waypoints, waypoints[1:], strict=False):
+        total += float(np.sqrt(squared_distances(a[None], b)[0]))
+    return total
+
+
+def assert_same(one: Events, other: Events) -> None:
+    """Two logs are equal bit by bit, field by field: what lies between the fields is nobody's."""
+    assert one.tables.keys() == other.tables.keys()
+    for kind, table in one.tables.items():
+        twin = other.tables[kind]
+        assert table.dtype == twin.dtype
+        assert len(table) == len(twin), kind
+        for name in table.dtype.names or ():
+            if table.dtype[name] != object:
+                assert table[name].tobytes() == twin[name].tobytes(), (kind, name)
+            else:
+                for x, y in zip(table[name], twin[name], strict=True):
+                    assert np.shape(x) == np.shape(y), (kind, name)
+                    assert np.asarray(x).tobytes() == np.asarray(y).tobytes(), (kind, name)

@@ -1,0 +1,197 @@
+"""The compiled nearest-neighbour tree against brute force.
+
+Distances are compared exactly: both sides sum the same squares in the same order.
+"""
+
+import naive
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from brrt.kernels.jit import kernel
+from brrt.kernels.kdtree import (
+    BUCKET,
+    KdTree,
+    grown_kdtree,
+    has_room,
+    insert,
+    nearest,
+    rooted_kdtree,
+)
+from brrt.robots.point import Point, PointSpace
+from brrt.worlds import World
+
+Floats = NDArray[np.float64]
+
+DIMS = pytest.mark.parametrize("dim", [2, 3])
+
+
+def space_of(dim: int) -> PointSpace:
+    """A point robot in an empty world; nearest neighbours do not mind the bounds."""
+    return Point().space(World("empty", np.zeros(dim), np.ones(dim)))
+
+
+@kernel
+def insert_some(tree: KdTree, space: PointSpace, points: Floats, first: int) -> int:
+    """Insert points from `first` on while there is room; return the first that is not in."""
+    n = first
+    while n < len(points) and has_room(tree):
+        insert(tree, space, points, n)
+        n += 1
+    return n
+
+
+@kernel
+def nearest_of_all(
+    tree: KdTree, space: PointSpace, queries: Floats, nodes: NDArray[np.int64]
+) -> None:
+    """Find the node nearest to each query."""
+    for row in range(len(queries)):
+        nodes[row] = nearest(tree, space, queries, row)
+
+
+def planted(points: Floats, capacity: int = 4) -> KdTree:
+    """The tree of all points, inserted one by one, grown whenever it is full."""
+    space, tree = space_of(points.shape[1]), rooted_kdtree(points[0], capacity)
+    done = 1
+    while done < len(points):
+        done = insert_some(tree, space, points, done)
+        if done < len(points):
+            capacity *= 2
+            tree = grown_kdtree(tree, capacity)
+    return tree
+
+
+def found(tree: KdTree, queries: Floats) -> NDArray[np.int64]:
+    """The node that the tree takes for the nearest to each query."""
+    nodes = np.full(len(queries), -2)
+    nearest_of_all(tree, space_of(queries.shape[1]), queries, nodes)
+    return nodes
+
+
+def check(tree: KdTree, points: Floats, queries: Floats) -> None:
+    """Hold the tree's answers to brute force: no other point is nearer."""
+    for query, node in zip(queries, found(tree, queries), strict=True):
+        assert 0 <= node < len(points)
+        squares = naive.squared_distances(points, query)
+        assert squares[node] == squares.min(), (query.tolist(), node, int(squares.argmin()))
+
+
+def clustered(rng: np.random.Generator, dim: int, n: int) -> Floats:
+    """Points in a few clusters of very different sizes."""
+    centres, spreads = rng.random((5, dim)), 10.0 ** -rng.uniform(1, 17, 5)
+    which = rng.integers(0, 5, n)
+    return centres[which] + spreads[which, None] * rng.normal(size=(n, dim))
+
+
+def collinear(rng: np.random.Generator, dim: int, n: int) -> Floats:
+    """Points on a line, along an axis or across all."""
+    along = rng.integers(0, 2, dim) * rng.normal(size=dim)
+    return rng.random(dim) + rng.random((n, 1)) * along
+
+
+def repeated(rng: np.random.Generator, dim: int, n: int) -> Floats:
+    """Points of which most are equal to others."""
+    return rng.integers(0, 3, (n, dim)) / 3
+
+
+def neighbours(rng: np.random.Generator, dim: int, n: int) -> Floats:
+    """Points that differ in their last bits alone."""
+    start = rng.random(dim)
+    return start + rng.integers(0, 3, (n, dim)) * np.spacing(start)
+
+
+def uniform(rng: np.random.Generator, dim: int, n: int) -> Floats:
+    """Points spread evenly."""
+    return rng.random((n, dim))
+
+
+@DIMS
+@pytest.mark.parametrize("kind", [uniform, clustered, collinear, repeated, neighbours])
+@pytest.mark.parametrize("n", [1, 2, BUCKET, BUCKET + 1, 100, 2000])
+def test_nearest_is_nearest(dim: int, kind, n: int) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """No point is nearer than the one that the tree finds, near the points and far from them."""
+    rng = np.random.default_rng(n + dim)
+    for _ in range(3):
+        points = kind(rng, dim, n)
+        tree = planted(points)
+        check(tree, points, rng.uniform(-1, 2, (60, dim)))
+        check(tree, points, points[rng.integers(0, n, 60)])
+        check(tree, points, kind(rng, dim, 60))
+
+
+@DIMS
+def test_while_growing(dim: int) -> None:
+    """The answers are right after each insertion, also across splits and growth."""
+    rng = np.random.default_rng(dim)
+    points, space = clustered(rng, dim, 400), space_of(dim)
+    tree = rooted_kdtree(points[0], 1)
+    for n in range(1, len(points)):
+        while insert_some(tree, space, points[: n + 1], n) == n:
+            tree = grown_kdtree(tree, 2 * n)
+        check(tree, points[: n + 1], rng.random((3, dim)))
+        check(tree, points[: n + 1], points[n : n + 1])
+
+
+coordinate = st.integers(0, 4).map(float) | st.integers(0, 3).map(
+    lambda k: 0.1 + k * np.spacing(0.1)
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data(), st.sampled_from([2, 3]), st.integers(1, 80))
+def test_any_points(data: st.DataObject, dim: int, n: int) -> None:
+    """Equal and all but equal points, in any order."""
+    numbers = data.draw(st.lists(coordinate, min_size=dim, max_size=24))
+    order = data.draw(st.integers(0, 2**32 - 1))
+    points = np.random.default_rng(order).choice(numbers, (n, dim))
+    tree = planted(points)
+    check(tree, points, points)
+    check(tree, points, np.random.default_rng(order).uniform(-1, 5, (10, dim)))
+
+
+@DIMS
+def test_all_but_equal_points(dim: int) -> None:
+    """Points an ulp apart, whose mean may round to beyond them all."""
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        start = rng.random(dim)
+        points = start - rng.integers(0, 2, (40, dim)) * np.spacing(start)
+        check(planted(points), points, points)
+
+
+@DIMS
+@pytest.mark.parametrize("share", [0.5, 0.8, 0.99])
+def test_most_points_share_a_coordinate(dim: int, share: float) -> None:
+    """Points that no split of the longest side parts evenly cost no more than others do."""
+    rng = np.random.default_rng(dim)
+    points = rng.random((20_000, dim))
+    points[rng.random(len(points)) < share, 0] = 0.0
+    points[:, 0] *= 3
+    check(planted(points), points, rng.random((30, dim)))
+
+
+@DIMS
+def test_growth_keeps_the_answers(dim: int) -> None:
+    """Growing changes no answer, and a tree of ample room gives the same as one grown often."""
+    rng = np.random.default_rng(dim)
+    points, queries = rng.random((3000, dim)), rng.random((500, dim))
+    often, never = planted(points, 1), planted(points, 100_000)
+    before = found(often, queries)
+    assert (before == found(never, queries)).all()
+    assert (before == found(grown_kdtree(often, 50_000), queries)).all()
+
+
+@pytest.mark.parametrize("capacity", [4, 100_000])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_points_that_come_in_order(dim: int, capacity: int) -> None:
+    """A line of points, one after the other, is the worst order for a tree; it answers all the same."""
+    n = 50_000 if not numba.config.DISABLE_JIT else 500
+    points = np.repeat(np.arange(n, dtype=np.float64)[:, None], dim, axis=1)
+    tree = planted(points, capacity)
+    rng = np.random.default_rng(dim)
+    check(tree, points, points[rng.integers(0, n, 30)])
+    check(tree, points, rng.random((30, dim)) * n)
