@@ -4,11 +4,11 @@ A new kind of event is added here alone: give it a number in `Kind` and its fiel
 Writers, readers, views and comparisons derive their layouts from that declaration.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, unique
 from functools import cache
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,6 +146,43 @@ def table_dtype(kind: Kind, dof: int) -> np.dtype[np.void]:
     return np.dtype(columns, align=True)
 
 
+class Instant(NamedTuple):
+    """When an event happened: `t` in ns, and the planner's count."""
+
+    t: int
+    iteration: int
+
+
+class LazyTables(Mapping[Kind, Table]):
+    """Tables that are built when someone asks for them, as a rule on the thread that writes them.
+
+    Args:
+        counts: Events of each kind that occurs.
+        last: When the last of them happened.
+        build: Makes the table of a kind.
+    """
+
+    def __init__(
+        self, counts: Mapping[Kind, int], last: Instant, build: Callable[[Kind], Table]
+    ) -> None:
+        self.counts, self.last = counts, last
+        self._build = build
+        self._built: dict[Kind, Table] = {}
+
+    def __getitem__(self, kind: Kind) -> Table:
+        if kind not in self._built:
+            if kind not in self.counts:
+                raise KeyError(kind)
+            self._built[kind] = self._build(kind)
+        return self._built[kind]
+
+    def __iter__(self) -> Iterator[Kind]:
+        return iter(self.counts)
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Events:
     """A batch of events, in one table a kind; a whole log is only a longer batch.
@@ -159,7 +196,25 @@ class Events:
     tables: Mapping[Kind, Table]
 
     def __len__(self) -> int:
-        return sum(map(len, self.tables.values()))
+        return sum(self.counts.values())
+
+    @property
+    def counts(self) -> Mapping[Kind, int]:
+        """Events of each kind that occurs."""
+        if isinstance(self.tables, LazyTables):
+            return self.tables.counts
+        return {kind: len(table) for kind, table in self.tables.items()}
+
+    @property
+    def last(self) -> Instant:
+        """When the last event happened; zero where there is none."""
+        if isinstance(self.tables, LazyTables):
+            return self.tables.last
+        tables = [table for table in self.tables.values() if len(table)]
+        if not tables:
+            return Instant(0, 0)
+        end = max(tables, key=lambda table: int(table["seq"][-1]))[-1]
+        return Instant(int(end["t"]), int(end["iteration"]))
 
     def __getitem__(self, kind: Kind) -> Table:
         found = self.tables.get(kind)

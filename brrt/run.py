@@ -1,7 +1,9 @@
 """Drive a planner: plan, smooth, and hand every event to the sinks."""
 
 import platform
+import sys
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from importlib.metadata import version
 from typing import Protocol
 
@@ -12,6 +14,9 @@ from brrt.kernels.emit import EventLog
 from brrt.planners.stop import Stop
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest, Scenario
+
+
+_SWITCH_S = 0.0005
 
 
 class Sink(Protocol):
@@ -86,7 +91,10 @@ class Run:
         sinks = list(sinks)
         metrics = Metrics(self.manifest)
         whole = False
+        patience = sys.getswitchinterval()
         try:
+            # Between two batches the planner must not wait 5 ms for a recorder to let go.
+            sys.setswitchinterval(_SWITCH_S)
             for batch in self.events():
                 for sink in sinks:
                     sink.write(batch)
@@ -95,6 +103,7 @@ class Run:
                     watch(metrics)
             whole = True
         finally:
+            sys.setswitchinterval(patience)
             _close_all(sinks, whole=whole)
         return metrics
 
@@ -108,6 +117,7 @@ def _close_all(sinks: list[Sink], *, whole: bool) -> None:
             _close_all(sinks[1:], whole=whole)
 
 
+@cache
 def made_by() -> dict[str, str]:
     """Versions of brrt and of what decides its numbers, and the platform."""
     names = {name: version(name) for name in ("brrt", "numpy", "numba", "llvmlite")}

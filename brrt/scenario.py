@@ -103,6 +103,10 @@ class Scenario:
             raise BrrtError(f"{path}: {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise BrrtError(f"{path}: not TOML: {error}") from None
+        # A map named in the file is looked for beside it first.
+        world = values.get("world")
+        if isinstance(world, str) and (path.parent / world).is_file():
+            values["world"] = str(path.parent / world)
         try:
             return cls.parse(values)
         except BrrtError as error:

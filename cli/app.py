@@ -56,12 +56,8 @@ def main(args: Sequence[str] | None = None) -> None:
 
 
 def _run(args: Sequence[str] | None) -> int:
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-
     try:
         return int(app(args, prog_name="brrt", standalone_mode=False) or 0)
-    except BrrtError as error:
-        complain(str(error))
     except typer.Abort:
         return Code.INTERRUPTED
     except KeyboardInterrupt:
@@ -73,7 +69,12 @@ def _run(args: Sequence[str] | None) -> int:
     except Exception as error:
         # Wrong usage: typer brings its own copy of click, whose classes have no public name.
         usage = getattr(error, "format_message", None)
-        if usage is None:
+        if usage is not None:
+            complain(f"{usage()} (see brrt --help)")
+            return Code.BAD_INPUT
+        from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+
+        if not isinstance(error, BrrtError):
             raise
-        complain(f"{usage()} (see brrt --help)")
+        complain(str(error))
     return Code.BAD_INPUT

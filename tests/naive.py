@@ -5,6 +5,7 @@ Floats are rational numbers, so `Fraction` decides every question about them wit
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +119,7 @@ def squared_distances(points: Floats, q: Floats) -> Floats:
 def path_length(waypoints: Floats) -> float:
     """Sum of the Euclidean lengths of a path's motions, from the start on."""
     total = 0.0
-    for a, b in zip(waypoints, waypoints[1:], strict=False):
+    for a, b in pairwise(waypoints):
         total += float(np.sqrt(squared_distances(a[None], b)[0]))
     return total
 
@@ -131,7 +132,7 @@ def assert_same(one: Events, other: Events) -> None:
         assert table.dtype == twin.dtype
         assert len(table) == len(twin), kind
         for name in table.dtype.names or ():
-            if table.dtype[name] != object:
+            if not table.dtype[name].hasobject:
                 assert table[name].tobytes() == twin[name].tobytes(), (kind, name)
             else:
                 for x, y in zip(table[name], twin[name], strict=True):

@@ -4,8 +4,8 @@ It may never call free what touches, and may call a hit only what nearly touches
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
 from brrt.worlds import World
+
+from . import naive
 
 Floats = NDArray[np.float64]
 Segment = tuple[Floats, Floats]
@@ -183,6 +185,17 @@ def test_long_or_flat_bounds(dim: int, flat: float) -> None:
         check(world, [(a, b) for a, b in moved if world.inside(a) and world.inside(b)])
 
 
+@DIMS
+@pytest.mark.parametrize("size", [1e-300, 1e-120, 1e100])
+def test_tiny_and_huge_maps_get_a_grid(dim: int, size: float) -> None:
+    """Nothing overflows or runs on for ever while the obstacles are entered."""
+    boxes = [[0.2 * size] * dim + [0.4 * size] * dim] * 20
+    obstacles = build_obstacles(world_of(dim, high=size, boxes=boxes))
+    inside, far = np.full(dim, 0.3 * size), np.full(dim, 0.9 * size)
+    assert compiled_hits(obstacles, inside, far)
+    assert not compiled_hits(obstacles, 0.6 * far, far)
+
+
 @st.composite
 def lattice_cases(draw: st.DrawFn) -> tuple[World, list[Segment]]:
     """Worlds and segments in small whole numbers, so that touching is frequent and exact."""
@@ -231,7 +244,7 @@ def border_cases(draw: st.DrawFn) -> tuple[World, list[Segment]]:
     filler = world_of(dim, high=size, boxes=[[0.0] * 2 * dim] * n)
     cells = build_obstacles(filler)
     borders = [
-        st.integers(0, count).map(lambda k, cell=cell: min(k * cell, size))
+        st.sampled_from([min(k * cell, size) for k in range(count + 1)])
         for cell, count in zip(cells.cell, cells.shape, strict=True)
     ]
     point = st.tuples(*borders)
@@ -267,12 +280,12 @@ def test_odd_numbers(dim: int, numbers: list[float], radius: float) -> None:
         for k in (0, 2)
     ]
     world = world_of(dim, balls=[[*points[4], radius], [*points[5], 0.5]], boxes=boxes)
-    check(world, list(zip(points[5:-1], points[6:], strict=True)))
+    check(world, list(pairwise(points[5:])))
 
 
 @MANY
 @given(st.sampled_from([2, 3]), st.floats(-1, 1), st.integers(0, 2), st.booleans())
-def test_tiny_components(dim: int, along: float, axis: int, down: bool) -> None:  # noqa: FBT001
+def test_tiny_components(dim: int, along: float, axis: int, down: bool) -> None:
     """A component that is all but zero neither hides an obstacle nor makes one up."""
     assume(axis < dim)
     tiny = np.full(dim, 1e-300 if not down else -1e-300)
@@ -314,7 +327,7 @@ def test_box_by_hand(
     dim: int,
     a: tuple[float, float],
     b: tuple[float, float],
-    touches: bool,  # noqa: FBT001
+    touches: bool,
 ) -> None:
     """The cases that one would draw on a blackboard, around the box from 4 to 6."""
     world = world_of(dim, boxes=[[4.0] * dim + [6.0] * dim])
@@ -344,7 +357,7 @@ def test_ball_by_hand(
     dim: int,
     a: tuple[float, float],
     b: tuple[float, float],
-    touches: bool,  # noqa: FBT001
+    touches: bool,
 ) -> None:
     """The same around the ball of radius 2 at 5."""
     world = world_of(dim, balls=[[5.0] * dim + [2.0]])

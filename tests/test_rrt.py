@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,6 +17,8 @@ from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
 from brrt.run import Run
 from brrt.scenario import Scenario
 from brrt.worlds import World
+
+from . import naive
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ def planned(scenario: Scenario, batch: int = 16384) -> tuple[Run, Events]:
     return run, Events.concat(run.problem.dof, run.events())
 
 
-def plain(world: str, **settings: Any) -> Scenario:  # noqa: ANN401
+def plain(world: str, **settings: Any) -> Scenario:
     """A scenario without smoothing, on the logical clock."""
     return Scenario(**{"world": world, "smooth": False, "clock": "logical", **settings})
 
@@ -157,7 +158,7 @@ def check_goal_tests(run: Run, events: Events) -> None:
     refused = rejects["node"][rejects["reason"] == Reason.GOAL_BLOCKED]
     step = options["step"] or 0.05 * run.problem.world.extent
     distances = np.sqrt(naive.squared_distances(edges["q"], run.problem.goal))
-    last = np.append(edges["iteration"][1:] != edges["iteration"][:-1], True)  # noqa: FBT003
+    last = np.append(edges["iteration"][1:] != edges["iteration"][:-1], True)
     within = distances <= (step if options["goal_test"] == "step" else np.inf)
     tested = edges["node"][last & within & (distances > 0)]
     assert (np.sort(refused) == tested).all()
@@ -387,7 +388,7 @@ def test_draws_that_all_fail_end_all_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("keep", [False, True])
-def test_start_next_to_the_goal(keep: bool) -> None:  # noqa: FBT001
+def test_start_next_to_the_goal(keep: bool) -> None:
     """A goal within a step is joined at once, without a draw."""
     scenario = plain(
         "circles2d:n=0", start=(1.0, 1.0), goal=(1.0, 4.0), params={"keep_intermediate": keep}
@@ -439,7 +440,7 @@ def test_a_vector_keeps_its_points(walled: str) -> None:
 
 
 @pytest.mark.parametrize("count_failed", [True, False])
-def test_a_time_budget_ends_the_run(walled: str, count_failed: bool) -> None:  # noqa: FBT001
+def test_a_time_budget_ends_the_run(walled: str, count_failed: bool) -> None:
     """A run ends when its time is up, with all that it did up to then in the log."""
     params = {"count_failed": count_failed}
     scenario = plain(walled, params=params, time=0.03, clock="real", iterations=10**9)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from typing import Any
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,6 +17,8 @@ from brrt.robots import Point
 from brrt.run import Run
 from brrt.scenario import Scenario
 from brrt.worlds import World
+
+from . import naive
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def replayed(world: World, raw: Floats, attempts: NDArray[np.void]) -> Floats:
     cost = naive.path_length(raw)
     for attempt in attempts:
         i, j = int(attempt["i"]), int(attempt["j"])
-        assert 0 <= i
+        assert i >= 0
         assert i + 2 <= j < len(path)
         if attempt["accepted"]:
             assert not naive.hits(world, path[i], path[j])
@@ -92,7 +93,7 @@ def check(world: World, raw: Floats, events: Events, attempts: int) -> Floats:
     st.sampled_from([0, 1, 10, 100, 300]),
     st.booleans(),
 )
-def test_contract(world: str, seed: int, attempts: int, keep: bool) -> None:  # noqa: FBT001
+def test_contract(world: str, seed: int, attempts: int, keep: bool) -> None:
     """Smoothing of RRT's paths in random worlds, those of collinear waypoints included."""
     scenario = Scenario(
         world=f"{world}:n=40,seed={seed}", seed=seed, iterations=4000, shortcuts=attempts,
@@ -111,7 +112,7 @@ def test_contract(world: str, seed: int, attempts: int, keep: bool) -> None:  # 
 
 @settings(max_examples=50, deadline=None)
 @given(st.integers(1, 30), st.integers(0, 60), st.integers(0, 99), st.booleans())
-def test_any_path(waypoints: int, attempts: int, seed: int, straight: bool) -> None:  # noqa: FBT001
+def test_any_path(waypoints: int, attempts: int, seed: int, straight: bool) -> None:
     """Random and straight paths, of one waypoint on."""
     rng = np.random.default_rng(seed)
     path = rng.uniform(0, 10, (waypoints, 2))
@@ -151,7 +152,7 @@ def test_no_way_through() -> None:
 
 
 def test_each_pair_is_equally_likely() -> None:
-    """All 15 pairs of 7 waypoints that are no neighbours get their share (6 standard deviations)."""
+    """All 15 pairs of 7 waypoints that are no neighbours get their share (6 sigma)."""
     n = 3000
     pairs = smoothed(BLOCKED, ring(), attempts=n, capacity=4000)[Kind.SHORTCUT][["i", "j"]]
     found, counts = np.unique(pairs, return_counts=True)

@@ -9,6 +9,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from brrt.kernels.jit import config
+
 _MONOTONIC = {"linux": 1, "darwin": 8}
 """CLOCK_MONOTONIC on Linux, CLOCK_UPTIME_RAW on macOS: what `time.perf_counter_ns` reads."""
 
@@ -31,7 +33,7 @@ def _clock_gettime(typingctx: Any, clock_id: Any) -> Any:  # noqa: ARG001
     return types.int64(types.int64), codegen
 
 
-if numba.config.DISABLE_JIT or sys.platform not in _MONOTONIC:
+if config.DISABLE_JIT or sys.platform not in _MONOTONIC:
     # Without the compiler, and where the C library has no such clock, events of one batch share
     # the time that the caller wrote into the buffer; `emit` keeps them apart by 1 ns.
     COMPILED_CLOCK = False

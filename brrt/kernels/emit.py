@@ -2,12 +2,13 @@
 
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Kind, table_dtype
+from brrt.events import FIELDS, Events, Instant, Kind, LazyTables, Table, table_dtype
 from brrt.kernels.clock import COMPILED_CLOCK, now_ns
 from brrt.kernels.jit import inlined
 
@@ -193,27 +194,47 @@ class EventLog:
 
     def drain(self) -> Events:
         """Hand out the events held so far, and begin anew."""
-        buffer, n = self.buffer, len(self)
-        first = int(buffer.state[_FIRST_SEQ])
-        tables = {}
-        for code in np.flatnonzero(np.bincount(buffer.kind[:n], minlength=len(Kind))):
-            kind = Kind(int(code))
-            rows = np.flatnonzero(buffer.kind[:n] == code)
-            table = np.empty(len(rows), table_dtype(kind, self.dof))
-            table["seq"] = rows + first
-            table["t"] = buffer.t[rows]
-            table["iteration"] = buffer.iteration[rows]
-            for name, column, place in _SLOTS[kind]:
-                if column == "ragged":
-                    for i, row in enumerate(rows):
-                        table[name][i] = self._ragged.pop(int(row))
-                elif column == "ints":
-                    table[name] = buffer.ints[rows, place]
-                elif column == "real":
-                    table[name] = buffer.real[rows]
-                else:
-                    table[name] = buffer.q[rows]
-            tables[kind] = table
-        buffer.state[_FIRST_SEQ] += n
-        buffer.state[_COUNT] = 0
-        return Events(self.dof, tables)
+        n = len(self)
+        first = int(self.buffer.state[_FIRST_SEQ])
+        held = _Held(first, self.dof, *(a[:n].copy() for a in self.buffer[1:]), self._ragged)
+        self._ragged = {}
+        self.buffer.state[_FIRST_SEQ] += n
+        self.buffer.state[_COUNT] = 0
+        counts = np.bincount(held.kind, minlength=len(Kind))
+        present = {Kind(int(code)): int(counts[code]) for code in np.flatnonzero(counts)}
+        last = Instant(int(held.t[-1]), int(held.iteration[-1])) if n else Instant(0, 0)
+        return Events(self.dof, LazyTables(present, last, held.table))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Held:
+    """The columns of a batch, out of the kernels' way; see `Buffer`."""
+
+    first: int
+    dof: int
+    kind: NDArray[np.uint8]
+    t: NDArray[np.int64]
+    iteration: NDArray[np.int64]
+    ints: NDArray[np.int32]
+    real: NDArray[np.float64]
+    q: NDArray[np.float64]
+    ragged: Mapping[int, NDArray[np.float64]]
+
+    def table(self, kind: Kind) -> Table:
+        """Gather the events of a kind, its fields under their names."""
+        rows = np.flatnonzero(self.kind == kind)
+        table = np.empty(len(rows), table_dtype(kind, self.dof))
+        table["seq"] = rows + self.first
+        table["t"] = self.t[rows]
+        table["iteration"] = self.iteration[rows]
+        for name, column, place in _SLOTS[kind]:
+            if column == "ragged":
+                for i, row in enumerate(rows):
+                    table[name][i] = self.ragged[int(row)]
+            elif column == "ints":
+                table[name] = self.ints[rows, place]
+            elif column == "real":
+                table[name] = self.real[rows]
+            else:
+                table[name] = self.q[rows]
+        return table

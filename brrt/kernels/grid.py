@@ -33,6 +33,7 @@ class Obstacles(NamedTuple):
     Attributes:
         lower: Least corner of the grid.
         cell: Edges of a cell.
+        per_length: Their reciprocals.
         shape: Cells along each axis.
         starts: Where each cell's entries begin in `items`, shape (cells + 1,).
         items: Obstacle numbers: balls first, then boxes.
@@ -42,6 +43,7 @@ class Obstacles(NamedTuple):
 
     lower: tuple[float, ...]
     cell: tuple[float, ...]
+    per_length: tuple[float, ...]
     shape: tuple[int, ...]
     starts: NDArray[np.int32]
     items: NDArray[np.int32]
@@ -69,9 +71,12 @@ def build_obstacles(world: World) -> Obstacles:
         edge *= 1.5
     starts, items = _entries(first.astype(np.int64), spans, shape)
     return Obstacles(
-        tuple(world.lower.tolist()), tuple(cell.tolist()), tuple(shape.tolist()),
-        starts, items, balls, boxes,
-    )  # fmt: skip
+        *(tuple(a.tolist()) for a in (world.lower, cell, 1.0 / cell, shape)),
+        starts,
+        items,
+        balls,
+        boxes,
+    )
 
 
 def _entries(
@@ -95,16 +100,18 @@ def _entries(
 
 
 @inlined
-def _cell_of(x: float, lower: float, cell: float, count: int) -> int:
-    return max(min(int((x - lower) / cell), count - 1), 0)
+def _cell_of(x: float, lower: float, per_length: float, count: int) -> int:
+    return max(min(int((x - lower) * per_length), count - 1), 0)
 
 
 @inlined
-def _first_crossing(x: float, step: float, lower: float, cell: float, at: int) -> float:
-    """Parameter at which a walk along one axis leaves its first cell."""
+def _crossing(
+    x: float, step: float, inverse: float, lower: float, width: float, cell: int
+) -> float:
+    """Parameter at which a walk along one axis leaves a cell; never, where it stands still."""
     if abs(step) < _TINY:
         return np.inf
-    return (lower + (at + 1 if step > 0 else at) * cell - x) / step
+    return (lower + (cell + 1 if step > 0 else cell) * width - x) * inverse
 
 
 @inlined
@@ -141,7 +148,7 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
     nx, ny = o.shape[0], o.shape[1]
     lx, ly, lz = o.lower[0], o.lower[1], 0.0
     wx, wy, wz = o.cell[0], o.cell[1], 1.0
-    cx, cy, cz = _cell_of(ax, lx, wx, nx), _cell_of(ay, ly, wy, ny), 0
+    cx, cy, cz = _cell_of(ax, lx, o.per_length[0], nx), _cell_of(ay, ly, o.per_length[1], ny), 0
     nz = 1
     if d == 3:
         # A tuple of two has no constant index 2; `z` is one that the compiler looks up later.
@@ -149,12 +156,12 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
         az = A[i, z]
         dz = B[j, z] - az
         lz, wz, nz = o.lower[z], o.cell[z], o.shape[z]
-        cz = _cell_of(az, lz, wz, nz)
+        cz = _cell_of(az, lz, o.per_length[z], nz)
     ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
     square = dx * dx + dy * dy + dz * dz
-    next_x = _first_crossing(ax, dx, lx, wx, cx)
-    next_y = _first_crossing(ay, dy, ly, wy, cy)
-    next_z = _first_crossing(az, dz, lz, wz, cz)
+    next_x = _crossing(ax, dx, ix, lx, wx, cx)
+    next_y = _crossing(ay, dy, iy, ly, wy, cy)
+    next_z = _crossing(az, dz, iz, lz, wz, cz)
     while True:
         cell = cx + nx * (cy + ny * cz)
         for entry in range(o.starts[cell], o.starts[cell + 1]):
@@ -187,18 +194,18 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
             cx += 1 if dx > 0 else -1
             if cx < 0 or cx >= nx:
                 return False
-            next_x = (lx + (cx + 1 if dx > 0 else cx) * wx - ax) * ix
+            next_x = _crossing(ax, dx, ix, lx, wx, cx)
         elif next_y <= next_z:
             if next_y > 1.0:
                 return False
             cy += 1 if dy > 0 else -1
             if cy < 0 or cy >= ny:
                 return False
-            next_y = (ly + (cy + 1 if dy > 0 else cy) * wy - ay) * iy
+            next_y = _crossing(ay, dy, iy, ly, wy, cy)
         else:
             if next_z > 1.0:
                 return False
             cz += 1 if dz > 0 else -1
             if cz < 0 or cz >= nz:
                 return False
-            next_z = (lz + (cz + 1 if dz > 0 else cz) * wz - az) * iz
+            next_z = _crossing(az, dz, iz, lz, wz, cz)

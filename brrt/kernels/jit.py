@@ -9,7 +9,10 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba import types
+from numba.core import config as _config
 from platformdirs import user_cache_path
+
+config: Any = _config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -77,14 +80,14 @@ no references: it borrows its arguments, and neither makes nor keeps an array.""
 
 
 def _compiled(fn: F, options: dict[str, Any]) -> F:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE_FOLDER or "")
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(CACHE_FOLDER or "")
     try:
         both = {"cache": CACHE_FOLDER is not None, "nogil": True, "error_model": "numpy", **options}
         dispatcher = numba.njit(**both)(fn)
     finally:
-        numba.config.CACHE_DIR = before
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        config.CACHE_DIR = before
+    if config.DISABLE_JIT:
         return fn
     resolve = dispatcher.get_call_template
     # Numba compiles a callee anew for each constant that it is called with; a kernel would take

@@ -47,7 +47,6 @@ class KdTree(NamedTuple):
         free_buckets: Buckets given back, shape (buckets,).
         gathered: Nodes of a cell that is being rebuilt, shape (capacity,).
         stack: Cells to visit, shape (256,).
-        stack_bound: Lower bounds of the measure to what they hold, shape (256,).
         work: Cells to rebuild, and which of the gathered nodes are theirs, shape (256, 3).
     """
 
@@ -64,7 +63,6 @@ class KdTree(NamedTuple):
     free_buckets: NDArray[np.int32]
     gathered: NDArray[np.int32]
     stack: NDArray[np.int32]
-    stack_bound: Floats
     work: NDArray[np.int64]
 
 
@@ -83,7 +81,7 @@ def rooted_kdtree(root: Floats, capacity: int) -> KdTree:
 def grown_kdtree(tree: KdTree, capacity: int) -> KdTree:
     """Return the same tree with room for `capacity` nodes."""
     larger = _empty_kdtree(tree.points.shape[1], capacity)
-    arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(larger, tree, strict=True))  # type: ignore[arg-type]
+    arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(larger, tree, strict=True))
     for new, old in arrays:
         new[: len(old)] = old
     return larger
@@ -106,7 +104,6 @@ def _empty_kdtree(d: int, capacity: int) -> KdTree:
         free_buckets=np.empty(buckets, np.int32),
         gathered=np.empty(capacity, np.int32),
         stack=np.empty(_STACK, np.int32),
-        stack_bound=np.empty(_STACK),
         work=np.empty((_STACK, 3), np.int64),
     )
 
@@ -147,6 +144,25 @@ def _stretch(tree: KdTree, cell: int, q: Floats, node: int, d: int) -> None:
     for k in range(d):
         tree.low[cell, k] = min(tree.low[cell, k], q[node, k])
         tree.high[cell, k] = max(tree.high[cell, k], q[node, k])
+
+
+@inlined
+def _open_leaf(tree: KdTree, cell: int, bucket: int, d: int) -> None:
+    tree.axis[cell], tree.size[cell] = _LEAF, 0
+    tree.child[cell, 0], tree.child[cell, 1] = bucket, bucket
+    for k in range(d):
+        tree.low[cell, k], tree.high[cell, k] = np.inf, -np.inf
+
+
+@inlined
+def _put(tree: KdTree, cell: int, node: int, q: Floats, row: int, d: int) -> None:
+    """Add a node that stands at q[row] to a leaf that has room."""
+    at = tree.child[cell, 0] * BUCKET + tree.size[cell]
+    _stretch(tree, cell, q, row, d)
+    for k in range(d):
+        tree.points[at, k] = q[row, k]
+    tree.nodes[at] = node
+    tree.size[cell] += 1
 
 
 @inlined
@@ -237,12 +253,9 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
             _stretch(tree, cell, q, ids[i], d)
         axis = _widest_axis(tree, cell, d)
         if hi - lo <= _FRESH or axis < 0:
-            bucket = _new_bucket(tree)
-            tree.axis[cell], tree.child[cell, 0], tree.child[cell, 1] = _LEAF, bucket, bucket
+            _open_leaf(tree, cell, _new_bucket(tree), d)
             for i in range(lo, hi):
-                tree.nodes[bucket * BUCKET + i - lo] = ids[i]
-                for k in range(d):
-                    tree.points[bucket * BUCKET + i - lo, k] = q[ids[i], k]
+                _put(tree, cell, ids[i], q, ids[i], d)
             continue
         split = _median(ids, lo, hi, q, axis)
         if split <= tree.low[cell, axis]:
@@ -258,6 +271,27 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
         tree.work[top, 0], tree.work[top, 1], tree.work[top, 2] = left, lo, middle
         tree.work[top + 1, 0], tree.work[top + 1, 1], tree.work[top + 1, 2] = right, middle, hi
         top += 2
+
+
+@borrowing
+def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
+    """Share a full leaf's nodes between two new leaves, at the mean of its longest side."""
+    bucket, other = tree.child[cell, 0], _new_bucket(tree)
+    left, right = _new_cell(tree), _new_cell(tree)
+    first = bucket * BUCKET
+    mean = 0.0
+    for at in range(first, first + BUCKET):
+        mean += tree.points[at, axis] / BUCKET
+    # Rounding could put the mean at the least coordinate, and then nothing would lie below it.
+    split = mean if mean > tree.low[cell, axis] else tree.high[cell, axis]
+    _open_leaf(tree, left, bucket, d)
+    _open_leaf(tree, right, other, d)
+    for at in range(first, first + BUCKET):
+        # The left leaf takes over the bucket, and fills it no faster than it is read.
+        child = right if tree.points[at, axis] >= split else left
+        _put(tree, child, tree.nodes[at], tree.points, at, d)
+    tree.axis[cell], tree.split[cell] = axis, split
+    tree.child[cell, 0], tree.child[cell, 1] = left, right
 
 
 @inlined
@@ -278,18 +312,14 @@ def insert(tree: KdTree, space: Any, q: Floats, node: int) -> None:
             lopsided = cell
         cell = child
     if tree.size[cell] == BUCKET:
-        if _widest_axis(tree, cell, d) < 0:
+        axis = _widest_axis(tree, cell, d)
+        if axis < 0:
             return
-        _rebuild(tree, q, cell, d)
+        _split(tree, cell, axis, d)
         _stretch(tree, cell, q, node, d)
         tree.size[cell] += 1
-        cell = tree.child[cell, 1 if q[node, tree.axis[cell]] >= tree.split[cell] else 0]
-    at = tree.child[cell, 0] * BUCKET + tree.size[cell]
-    for k in range(d):
-        tree.points[at, k] = q[node, k]
-    tree.nodes[at] = node
-    _stretch(tree, cell, q, node, d)
-    tree.size[cell] += 1
+        cell = tree.child[cell, 1 if q[node, axis] >= tree.split[cell] else 0]
+    _put(tree, cell, node, q, node, d)
     tree.counts[_NODES] += 1
     if lopsided >= 0:
         _rebuild(tree, q, lopsided, d)
@@ -302,30 +332,23 @@ def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:
     Each cell knows the box around its nodes. The half-space that a split leaves would not do:
     most samples lie far from a young tree, and its outer cells would have no end on that side.
     """
-    stack, bounds = tree.stack, tree.stack_bound
+    stack = tree.stack
     best, node, cell, top = np.inf, -1, 0, 0
     while True:
-        if tree.axis[cell] != _LEAF:
-            close, far = tree.child[cell, 0], tree.child[cell, 1]
-            bound = box_measure(space, tree.low, tree.high, close, Q, row)
-            other = box_measure(space, tree.low, tree.high, far, Q, row)
-            if other < bound:
-                close, far, bound, other = far, close, other, bound
-            if other < best:
-                stack[top], bounds[top] = far, other
-                top += 1
-            if bound < best:
-                cell = close
-                continue
-        else:
-            first = tree.child[cell, 0] * BUCKET
-            for at in range(first, first + tree.size[cell]):
-                measured = measure(space, tree.points, at, Q, row)
-                if measured < best:
-                    best, node = measured, tree.nodes[at]
-        while top > 0 and bounds[top - 1] >= best:
+        while tree.axis[cell] != _LEAF:
+            side = 1 if Q[row, tree.axis[cell]] >= tree.split[cell] else 0
+            stack[top] = tree.child[cell, 1 - side]
+            top += 1
+            cell = tree.child[cell, side]
+        first = tree.child[cell, 0] * BUCKET
+        for at in range(first, first + tree.size[cell]):
+            measured = measure(space, tree.points, at, Q, row)
+            if measured < best:
+                best, node = measured, tree.nodes[at]
+        while True:
+            if top == 0:
+                return node
             top -= 1
-        if top == 0:
-            return node
-        top -= 1
-        cell = stack[top]
+            cell = stack[top]
+            if box_measure(space, tree.low, tree.high, cell, Q, row) < best:
+                break

@@ -111,12 +111,11 @@ def _planted_tree(problem: Problem, capacity: int) -> _rrt.Tree:
 def _grown_tree(tree: _rrt.Tree) -> _rrt.Tree:
     """Return the tree with twice the room, whatever it ran out of."""
     n, capacity = int(tree.counts[_rrt.NODES]), 2 * len(tree.parent)
-    q, parent, cost = (np.empty((capacity, *a.shape[1:]), a.dtype) for a in tree[:3])
-    for new, old in zip((q, parent, cost), tree[:3], strict=True):
-        new[:n] = old[:n]
-    return _rrt.Tree(
-        q, parent, cost, grown_kdtree(tree.neighbours, capacity), tree.counts, tree.scratch
-    )
+    q, parent = np.empty((capacity, tree.q.shape[1])), np.empty(capacity, np.int32)
+    cost = np.empty(capacity)
+    q[:n], parent[:n], cost[:n] = tree.q[:n], tree.parent[:n], tree.cost[:n]
+    neighbours = grown_kdtree(tree.neighbours, capacity)
+    return tree._replace(q=q, parent=parent, cost=cost, neighbours=neighbours)
 
 
 def _lineage(parent: NDArray[np.int32], node: int) -> list[int]:

@@ -65,10 +65,10 @@ class Layout:
                 sequence of float64.
         """
         at = RECORD_HEAD.itemsize + len(_HEADER)
-        columns: list[tuple[str, Any, int]] = [
-            (name, kind, RECORD_HEAD.fields[name][1])  # type: ignore[index] - it has fields
-            for name, kind in _RECORD
-        ]
+        columns: list[tuple[str, Any, int]] = []
+        for name, kind in _RECORD:
+            begin = sum(np.dtype(before).itemsize for _, before in _RECORD[: len(columns)])
+            columns.append((name, kind, begin))
         columns.append(("encapsulation", "<u4", RECORD_HEAD.itemsize))
         position, ragged = 0, None
         for line in text.splitlines():

@@ -33,6 +33,7 @@ class Drain:
             self._file = path.open("wb", buffering=0)
         except OSError as error:
             raise self._cannot_write(error) from None
+        self._inlet: int | None
         self._outlet, self._inlet = os.pipe()
         self.inlet = f"/dev/fd/{self._inlet}"
         self._thread = threading.Thread(target=self._work, name="brrt drain", daemon=True)
@@ -40,7 +41,9 @@ class Drain:
 
     def seal(self) -> None:
         """Leave the pipe to who has opened the inlet: once they close it, the file is complete."""
-        os.close(self._inlet)
+        if self._inlet is not None:
+            os.close(self._inlet)
+            self._inlet = None
 
     def check(self) -> None:
         """Say whether the file took everything so far.
@@ -53,6 +56,7 @@ class Drain:
 
     def close(self) -> None:
         """Wait for the end of the pipe, then check."""
+        self.seal()
         self._thread.join()
         self.check()
 

@@ -235,7 +235,7 @@ class Drawing:
                 self._path = np.delete(self._path, slice(event["i"] + 1, event["j"]), axis=0)
             if self._path is not None and (stage is not None or len(self._path) <= _LONGEST_SHOWN):
                 place = _places(self._path, self._dim)
-                drawn.setdefault(stage or Stage.SMOOTHED, []).append((event, place))
+                drawn.setdefault(Stage.SMOOTHED if stage is None else stage, []).append((event, place))
         for stage, items in drawn.items():
             columns = self._strips(
                 np.concatenate([p for _, p in items]), [len(p) for _, p in items]

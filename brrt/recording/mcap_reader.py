@@ -31,6 +31,9 @@ U = TypeVar("U")
 _MAX_RECORD = 1 << 28
 """Bytes that a record or a chunk may hold: a length that lies must not exhaust the memory."""
 
+_FOOTER = 29
+"""Bytes of the footer's record."""
+
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 _LABELS = {f"/brrt/{kind.label}": kind for kind in Kind}
 
@@ -108,12 +111,30 @@ def _records(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tuple[
             raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
         if opcode == Opcode.DATA_END:
             stated = _parse(path, records.DataEnd, data).data_section_crc
-            if check_end and stated and stated != crc:
-                raise RecordingError(f"{path}: damaged: the checksum of the data does not match")
             yield opcode, data
+            if check_end:
+                if stated and stated != crc:
+                    raise RecordingError(f"{path}: damaged: the checksum of the data differs")
+                _check_summary(path, file)
             return
         crc = zlib.crc32(data, zlib.crc32(head, crc))
         yield opcode, data
+
+
+def _check_summary(path: Path, file: IO[bytes]) -> None:
+    """See that what follows the data is whole: summary, footer, magic.
+
+    Raises:
+        CutError: It is not all there.
+        RecordingError: It is damaged.
+    """
+    rest = file.read(_MAX_RECORD)
+    if not rest.endswith(MAGIC) or len(rest) < _FOOTER + len(MAGIC):
+        raise CutError(f"{path}: the file is cut at byte {file.tell():,}, behind the last event")
+    # All but the checksum itself, which is the footer's last field.
+    body, crc = rest[: -len(MAGIC) - 4], rest[-len(MAGIC) - 4 : -len(MAGIC)]
+    if zlib.crc32(body) != struct.unpack("<I", crc)[0]:
+        raise RecordingError(f"{path}: damaged: the checksum of the summary differs")
 
 
 def _result(path: Path) -> Mapping[str, Any] | None:

@@ -7,7 +7,6 @@ import shutil
 import warnings
 import zlib
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +55,7 @@ class RerunSink:
         rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
         self._manifest, self._view = manifest, view
         self._metrics, self._checksums = Metrics(manifest), Checksums()
+        layout = blueprint(manifest, world)
         self._rec: Any = rr.RecordingStream(
             APPLICATION, recording_id=recording_id(manifest), send_properties=False
         )
@@ -64,13 +64,12 @@ class RerunSink:
             _open_viewer()
         self._drain = None if path is None else Drain(path)
         try:
-            self._connect(blueprint(manifest, world))
+            self._connect(layout)
             self._write_head(world)
             self._drawing = Drawing(self._rec, manifest, world)
             self._flush()
         except BaseException:
-            with suppress(RecordingError):  # the first error is the one to tell
-                self._disconnect()
+            self._rec.disconnect()
             raise
 
     def write(self, events: Events) -> None:

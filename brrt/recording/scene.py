@@ -17,7 +17,7 @@ Colour = tuple[int, int, int]
 FREE: Colour = (34, 37, 45)
 """Free space: not black, so that dark obstacles stand out against it."""
 OBSTACLE: Colour = (10, 11, 14)
-OBSTACLE_3D = (120, 130, 150, 60)
+OBSTACLE_3D = (112, 120, 137)
 OUTLINE: Colour = (96, 103, 118)
 START: Colour = (255, 145, 30)
 GOAL: Colour = (60, 215, 100)
@@ -31,7 +31,7 @@ PATHS: Mapping[Stage, tuple[str, Colour, float]] = {
     Stage.SMOOTHED: ("smoothed", (255, 184, 0), 3.0),
 }
 """Names, colours and radii of the paths, in points of the screen."""
-SAMPLES: Mapping[Source, Colour] = {Source.UNIFORM: (170, 178, 190), Source.GOAL: GOAL}
+SAMPLES: Mapping[Source, Colour] = {Source.UNIFORM: (135, 143, 158), Source.GOAL: GOAL}
 REJECTS: Mapping[Reason, Colour] = {
     Reason.COLLISION: (150, 74, 80),
     Reason.NO_PROGRESS: (120, 110, 90),
@@ -68,11 +68,13 @@ def log_scene(rec: Any, manifest: Manifest, world: World) -> None:  # noqa: ANN4
     still = _still_2d(world) if is_flat(manifest) else _still_3d(world)
     for entity, archetype in still.items():
         rec.log(entity, archetype, static=True)
-    marks: Any = rr.Points2D if is_flat(manifest) else rr.Points3D
-    over_all = {"draw_order": 100.0} if is_flat(manifest) else {}
     for name, q, colour in (("start", manifest.start, START), ("goal", manifest.goal, GOAL)):
-        place = [q[: manifest.dim]]
-        mark = marks(place, colors=colour, radii=-7, labels=name, show_labels=True, **over_all)
+        look: dict[str, Any] = {"colors": colour, "radii": -7, "labels": name, "show_labels": True}
+        place = np.array([q[: manifest.dim]])
+        if is_flat(manifest):
+            mark = rr.LineStrips2D(_discs(place, 1e-6 * world.extent), draw_order=100, **look)
+        else:
+            mark = rr.Points3D(place, **look)
         rec.log(f"/world/{name}", mark, static=True)
 
 
@@ -84,16 +86,19 @@ def _still_2d(world: World) -> dict[str, Any]:
         )
     }
     if len(world.balls):
-        # Discs: a line that goes nowhere has round ends, and unlike a point no shading.
-        centres, radii = world.balls[:, :2], world.balls[:, 2]
-        nowhere = centres + radii[:, None] * [1e-3, 0]
-        discs = np.stack([centres, nowhere], axis=1).astype(np.float32)
+        radii = world.balls[:, 2]
+        discs = _discs(world.balls[:, :2], 1e-3 * radii[:, None])
         still["/world/obstacles/balls"] = rr.LineStrips2D(
             discs, radii=radii, colors=OBSTACLE, draw_order=0
         )
     if len(world.boxes):
         still["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
     return still
+
+
+def _discs(centres: NDArray[np.float64], nowhere: Any) -> NDArray[np.float32]:  # noqa: ANN401
+    """Lines that hardly go anywhere: their round ends make a disc, and points have shading."""
+    return np.stack([centres, centres + nowhere * np.array([1.0, 0.0])], axis=1).astype(np.float32)
 
 
 def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> Any:  # noqa: ANN401
@@ -116,7 +121,9 @@ def _still_3d(world: World) -> dict[str, Any]:
     see_through = rr.components.FillMode.TransparentFillMajorWireframe
     size = world.upper - world.lower
     still: dict[str, Any] = {
-        "/world/bounds": rr.Boxes3D(mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-0.5)
+        "/world/bounds": rr.Boxes3D(
+            mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-0.5, fill_mode="MajorWireframe"
+        )
     }
     if len(world.balls):
         still["/world/obstacles/balls"] = rr.Ellipsoids3D(
@@ -152,21 +159,22 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
         "settings": ", ".join(f"{name}={value}" for name, value in settings.items()),
         "made by": ", ".join(f"{name} {value}" for name, value in manifest.made_by.items()),
     }
-    if figures is not None:
-        rows = {"result": _result(figures), **rows}
+    rows = _results(figures) | rows
     table = "".join(f"| {name} | {_cell(value)} |\n" for name, value in rows.items())
-    return f"# {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"
+    return f"### {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"
 
 
-def _result(figures: Mapping[str, Any]) -> str:
-    parts = [f"{figures['status']} after {figures['iterations']:,} iterations"]
-    parts.append(f"{figures['nodes']:,} nodes")
+def _results(figures: Mapping[str, Any] | None) -> dict[str, str]:
+    if figures is None:
+        return {}
+    rows = {"status": f"{figures['status']} after {figures['iterations']:,} iterations"}
+    rows["nodes"] = f"{figures['nodes']:,}"
     if figures["plan_time_s"] is not None:
-        parts.append(f"{figures['plan_time_s'] * 1e3:.3g} ms")
+        rows["planning"] = f"{figures['plan_time_s'] * 1e3:.4g} ms"
     for name, key in (("path", "path_cost"), ("smoothed", "smoothed_cost")):
         if figures[key] is not None:
-            parts.append(f"{name} {figures[key]:.5g}")
-    return ", ".join(parts)
+            rows[name] = f"{figures[key]:.6g}"
+    return rows
 
 
 def _cell(value: object) -> str:
@@ -179,20 +187,25 @@ def _numbers(values: tuple[float, ...]) -> str:
 
 def blueprint(manifest: Manifest, world: World) -> Any:  # noqa: ANN401 - a rerun Blueprint
     """Lay out the world, the plots, the log and the manifest, with the time at the start."""
+    axis = rrb.TimeAxis(view_range=rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()))
     plots = [
-        rrb.TimeSeriesView(origin=f"/series/{entity}", name=name)
+        rrb.TimeSeriesView(origin=f"/series/{entity}", name=name, axis_x=axis)
         for entity, name in (
             ("nodes", "Nodes"),
             ("cost", "Path cost"),
             ("rejected", "Rejected extensions, %"),
         )
     ]
-    log = rrb.TextLogView(origin="/log", name="Log")
+    log = rrb.TextLogView(
+        origin="/log",
+        name="Log",
+        columns=rrb.TextLogColumns(timeline_columns=["iteration"], text_log_columns=["body"]),
+    )
     run = rrb.TextDocumentView(origin="/run", name="Run")
-    right = rrb.Vertical(*plots, log, run, row_shares=[3, 3, 3, 3, 5])
+    right = rrb.Vertical(*plots, log, run, row_shares=[3, 3, 3, 4, 5])
     return rrb.Blueprint(
         rrb.Horizontal(_world_view(manifest, world), right, column_shares=[5, 2]),
-        rrb.TimePanel(state="expanded", timeline="iteration", play_state="paused"),
+        rrb.TimePanel(state="collapsed", timeline="iteration", play_state="paused", fps=100),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
@@ -224,7 +237,7 @@ def _world_view(manifest: Manifest, world: World) -> Any:  # noqa: ANN401
     reach = float(np.linalg.norm(world.upper - world.lower))
     eye = rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=centre + reach * np.array([-0.75, -1.0, 0.6]),
+        position=centre + reach * np.array([-0.6, -0.8, 0.5]),
         look_target=centre,
         eye_up=[0, 0, 1],
     )

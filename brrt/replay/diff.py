@@ -81,9 +81,12 @@ def _compare(a: Events, b: Events) -> Difference | None:
     if not len(a) and not len(b):
         return None
     first, kinds = a.kinds_in_order()
+    if a.dof != b.dof:
+        ours, theirs = ({**(_event_at(e, first) or {}), "dof": e.dof} for e in (a, b))
+        return Difference(first, ours, theirs)
     other_first, other_kinds = b.kinds_in_order()
     seqs: list[int] = []
-    if first != other_first or a.dof != b.dof:
+    if first != other_first:
         seqs.append(min(first, other_first))
     else:
         n = min(len(kinds), len(other_kinds))

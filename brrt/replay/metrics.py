@@ -29,11 +29,12 @@ class Metrics:
 
     def write(self, events: Events) -> None:
         """Take in a batch."""
-        for kind, table in events.tables.items():
-            self._events += len(table)
-            self._counts[kind] += len(table)
-            self._iterations = max(self._iterations, int(table["iteration"][-1]))
-            self._last_t = max(self._last_t, int(table["t"][-1]))
+        for kind, count in events.counts.items():
+            self._events += count
+            self._counts[kind] += count
+        last = events.last
+        self._iterations = max(self._iterations, last.iteration)
+        self._last_t = max(self._last_t, last.t)
         for event in events[Kind.PATH]:
             path = np.array(event["waypoints"]).reshape(-1, events.dof)
             self._paths[Stage(int(event["stage"]))] = (float(event["cost"]), path)

@@ -54,16 +54,13 @@ class Generator(Settings):
         Raises:
             BrrtError: The obstacles are so large that they leave no room for start and goal.
         """
-        ends = [
-            np.full(self.dim, part * self.size) if given is None else np.asarray(given)
-            for part, given in ((0.05, start), (0.95, goal))
-        ]
+        ends = [self._end(given, part) for given, part in ((start, 0.05), (goal, 0.95))]
         rng = np.random.default_rng(self.seed)
         centres, halves = self.draw(rng, self.n)
         for _ in range(_REDRAWS):
-            bad = np.logical_or.reduce(
-                [self.covers(centres, halves, end) for end in ends if len(end) == self.dim]
-            )
+            bad = np.zeros(self.n, bool)
+            for end in ends:
+                bad |= self.covers(centres, halves, end)
             count = int(bad.sum())
             if count == 0:
                 return self.place(name, centres, halves, ends)
@@ -73,13 +70,18 @@ class Generator(Settings):
             f"make them smaller or the map larger"
         )
 
+    def _end(self, given: Floats | None, part: float) -> Floats:
+        """Return the point to keep free; one that is of no use is the query's to refuse."""
+        if given is not None and len(given) == self.dim and np.isfinite(given).all():
+            return np.asarray(given, np.float64)
+        return np.full(self.dim, part * self.size)
+
     def _centres(self, rng: np.random.Generator, halves: Floats) -> Floats:
         return halves + (self.size - 2 * halves) * rng.random(halves.shape)
 
     def _world(self, name: str, ends: list[Floats], *, balls: Floats, boxes: Floats) -> World:
         lower, upper = np.zeros(self.dim), np.full(self.dim, self.size)
-        keep = all(len(end) == self.dim for end in ends)
-        start, goal = ends if keep else (None, None)
+        start, goal = ends
         return World(name, lower, upper, balls, boxes, start, goal)
 
 
@@ -135,7 +137,8 @@ class Boxes(Generator):
 
     def covers(self, centres: Floats, halves: Floats, point: Floats) -> NDArray[np.bool_]:
         """Compare the offset along each axis with half side and clearance."""
-        return (np.abs(centres - point) <= halves + _CLEARANCE * self.size).all(axis=1)
+        near = np.abs(centres - point) <= halves + _CLEARANCE * self.size
+        return np.asarray(near.all(axis=1))
 
     def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
         """Write each box as its least and greatest corner."""

@@ -1,0 +1,80 @@
+"""Fixtures shared by all tests."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from brrt import Events, Memory, Run, Scenario
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The object on stdout."""
+        found = json.loads(self.out)
+        assert isinstance(found, dict)
+        return found
+
+
+@pytest.fixture
+def brrt(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Callable[..., Result]:
+    """Run the installed command in process, in an empty folder: `brrt("plan", "--seed", "1")`."""
+    (script,) = entry_points(group="console_scripts", name="brrt")
+    main = script.load()
+    monkeypatch.chdir(tmp_path)
+
+    def call(*args: object) -> Result:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main([str(arg) for arg in args])
+        out, err = capfd.readouterr()
+        return Result(int(ended.value.code or 0), out, err)
+
+    return call
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> Callable[..., Result]:
+    """Run the command as a process of its own, in an empty folder."""
+
+    def call(*args: object, timeout: float = 120) -> Result:
+        done = subprocess.run(
+            [sys.executable, "-m", "brrt_cli", *map(str, args)],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            timeout=timeout,
+            check=False,
+        )
+        return Result(done.returncode, done.stdout, done.stderr)
+
+    return call
+
+
+@cache
+def _recorded(scenario: str, batch: int) -> tuple[Run, Events]:
+    run, memory = Run(Scenario.parse(json.loads(scenario)), batch=batch), Memory()
+    run.execute([memory])
+    return run, memory.events()
+
+
+def recorded(scenario: Scenario, *, batch: int = 16384) -> tuple[Run, Events]:
+    """Run a scenario, once for all tests; return it with its whole log."""
+    return _recorded(json.dumps(scenario.as_dict()), batch)
