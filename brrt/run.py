@@ -15,7 +15,6 @@ from brrt.planners.stop import Stop
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest, Scenario
 
-
 _SWITCH_S = 0.0005
 
 

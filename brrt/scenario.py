@@ -17,6 +17,9 @@ from brrt.problem import Problem
 from brrt.robots import ROBOTS
 from brrt.worlds import World, make_world
 
+_MOST = 10**15
+"""Above any count that a run could reach, and well within 64 bits."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
@@ -31,6 +34,7 @@ class Scenario:
         goal: Last configuration; the world's own by default.
         seed: Seed of every random draw of the planner and the smoother.
         iterations: Iterations that the planner may make.
+        draws: Draws that it may make, whether they count as iterations or not; for a re-run.
         time: Seconds that it may take.
         smooth: Shortcut the path once there is one.
         shortcuts: Attempts of the smoother.
@@ -45,6 +49,7 @@ class Scenario:
     goal: tuple[float, ...] | None = None
     seed: int = 0
     iterations: int = 1_000_000
+    draws: int | None = None
     time: float | None = None
     smooth: bool = True
     shortcuts: int = 100
@@ -56,6 +61,11 @@ class Scenario:
         Raises:
             BrrtError: A name is unknown or a number out of range.
         """
+        for name in ("world", "robot", "planner", "clock"):
+            if not isinstance(getattr(self, name), str):
+                raise BrrtError(f"{name} must be a text, not {getattr(self, name)!r}")
+        if not isinstance(self.smooth, bool):
+            raise BrrtError(f"smooth must be true or false, not {self.smooth!r}")
         if self.planner not in PLANNERS:
             raise unknown("planner", self.planner, PLANNERS)
         if self.robot not in ROBOTS:
@@ -65,8 +75,10 @@ class Scenario:
         _whole("seed", self.seed, low=0)
         _whole("iterations", self.iterations, low=1)
         _whole("shortcuts", self.shortcuts, low=0)
-        if self.time is not None and not 0 < float(self.time) < np.inf:
-            raise BrrtError(f"time must be above 0 seconds, not {self.time}")
+        if self.draws is not None:
+            _whole("draws", self.draws, low=1)
+        if self.time is not None and not _positive(self.time):
+            raise BrrtError(f"time must be above 0 seconds, not {self.time!r}")
         settings = self.make_planner().as_dict()
         given = {name: settings[name] for name in self.params}
         object.__setattr__(self, "params", given)
@@ -118,7 +130,7 @@ class Scenario:
 
     def with_stop_at(self, iterations: int) -> "Scenario":
         """Return the scenario of a run that the clock or a person cut, ended at that iteration."""
-        return replace(self, iterations=max(1, iterations), time=None)
+        return replace(self, draws=max(1, iterations), time=None)
 
     def make_planner(self) -> Planner:
         """Make the planner with its settings."""
@@ -130,7 +142,7 @@ class Scenario:
 
     def make_stop(self) -> Stop:
         """Make the budget."""
-        return Stop(iterations=self.iterations, time_s=self.time)
+        return Stop(iterations=self.iterations, draws=self.draws, time_s=self.time)
 
     def make_problem(self, world: World | None = None) -> Problem:
         """Make the world, unless it is at hand, and put the robot and the query into it.
@@ -155,11 +167,17 @@ class Scenario:
         return Problem(world, ROBOTS[self.robot](), start, goal)
 
 
+def _positive(value: Any) -> bool:
+    return isinstance(value, int | float) and 0 < value < np.inf
+
+
 def _whole(name: str, value: Any, *, low: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int):
         raise BrrtError(f"{name} must be a whole number, not {value!r}")
     if value < low:
         raise BrrtError(f"{name} must be at least {low}, not {value}")
+    if name != "seed" and value > _MOST:
+        raise BrrtError(f"{name} must be at most {_MOST:,}, not {value}")
 
 
 def _configuration(name: str, value: Any) -> tuple[float, ...]:

@@ -144,7 +144,7 @@ def _as_bool(name: str, value: Any) -> bool:
 def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:
     if not isinstance(value, int | float):
         return
-    if not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise BrrtError(f"{name} must be a finite number, not {value}")
     low, above, high = meta["low"], meta["above"], meta["high"]
     if low is not None and value < low:

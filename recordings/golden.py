@@ -1,7 +1,7 @@
 """Golden recordings: hold what the planners do today against what is kept here.
 
-    python recordings/golden.py check           compare, exit 1 at a difference
-    python recordings/golden.py update [NAME]   plan anew, print what changed, exit 1 if any did
+python recordings/golden.py check           compare, exit 1 at a difference
+python recordings/golden.py update [NAME]   plan anew, print what changed, exit 1 if any did
 """
 
 import argparse

@@ -95,7 +95,10 @@ def test_scenario_file_and_options(brrt: Command) -> None:
     assert done.json["seed"] == 4
     assert done.json["world"].endswith("m.txt")
     (folder / "s.toml").write_text("wrold = 1\n")
-    assert "unknown key of a scenario 'wrold'; did you mean 'world'?" in brrt("plan", "maps/s.toml").err
+    assert (
+        "unknown key of a scenario 'wrold'; did you mean 'world'?"
+        in brrt("plan", "maps/s.toml").err
+    )
 
 
 BAD = {

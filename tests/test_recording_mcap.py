@@ -1,7 +1,6 @@
 """MCAP recordings: exact, readable by stock tools, and honest about damage."""
 
 import json
-import subprocess
 from collections import Counter
 from pathlib import Path
 
@@ -73,7 +72,9 @@ def test_stock_mcap_decodes_every_message(tmp_path: Path) -> None:
             assert message.log_time > last
             last = message.log_time
             for field in FIELDS[Kind[label.upper()]]:
-                assert np.array_equal(np.ravel(row[field.name]), np.ravel(getattr(decoded, field.name)))
+                assert np.array_equal(
+                    np.ravel(row[field.name]), np.ravel(getattr(decoded, field.name))
+                )
         figures = read(tmp_path / "run.mcap").metrics().as_dict()
         statistics = reader.get_summary()
     assert statistics is not None
@@ -126,7 +127,9 @@ def test_layout_derives_from_the_text() -> None:
     assert Layout.parse(definition(Kind.PATH, 3)).ragged == "waypoints"
 
 
-@pytest.mark.parametrize("text", ["string name", "float64[0] q", "uint8[] x", "float64[x] q", "uint8"])
+@pytest.mark.parametrize(
+    "text", ["string name", "float64[0] q", "uint8[] x", "float64[x] q", "uint8"]
+)
 def test_layout_refuses_what_it_cannot_lay_out(text: str) -> None:
     """A schema that is not flat is an error, not a guess."""
     with pytest.raises(RecordingError, match="unsupported message field"):
@@ -145,7 +148,7 @@ def test_cut_file_gives_its_whole_chunks(tmp_path: Path) -> None:
         recording, batches = read(path), list[Events]()
         with pytest.raises(CutError, match="cut at byte"):
             for batch in recording.batches():
-                batches.append(batch)  # noqa: PERF402 - keeps what came before the error
+                batches.append(batch)
         got = Events.concat(2, batches)
         assert same(got, log.until(seq=len(got) - 1))
         assert recording.result is None
@@ -154,7 +157,9 @@ def test_cut_file_gives_its_whole_chunks(tmp_path: Path) -> None:
     assert 0 < saved[len(saved) // 2] < len(log)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(where=st.floats(0, 1, exclude_max=True), flip=st.integers(1, 255))
 def test_flipped_byte_is_harmless_or_reported(
     where: float, flip: int, tmp_path_factory: pytest.TempPathFactory

@@ -104,7 +104,7 @@ def test_first_difference_is_the_first(data: st.DataObject) -> None:
     row = data.draw(st.integers(0, len(table) - 1))
     name = data.draw(st.sampled_from([n for n in table.dtype.names or () if n not in ("seq", "t")]))
     value = np.copy(table[name][row])
-    changed = value + 1 if not value.dtype == bool else not value
+    changed = value + 1 if value.dtype != bool else not value
     if name in ("name", "status", "source", "reason", "stage"):
         changed = 1 - min(int(value), 1)
     table[name][row] = changed

@@ -121,7 +121,8 @@ def check_extensions(run: Run, events: Events) -> None:
     slices = options["slices"] if options["keep_intermediate"] else 1
     rejects = events[Kind.REJECT]
     assert (rejects["tree"] == 0).all()
-    for sample in events[Kind.SAMPLE]:
+    samples = events[Kind.SAMPLE]
+    for sample in samples[:: 1 + len(samples) // 400]:
         grown = edges[edges["iteration"] == sample["iteration"]]
         refused = rejects[rejects["iteration"] == sample["iteration"]]
         blocked = refused["reason"] == Reason.GOAL_BLOCKED

@@ -150,6 +150,14 @@ class EventLog:
         """Events that fit before the next `drain`."""
         return len(self.buffer.kind) - len(self)
 
+    def reserve(self, events: int) -> None:
+        """Make a batch large enough for so many events, which a planner emits in one go."""
+        if events > len(self.buffer.kind):
+            larger = type(self)(self.dof, events).buffer
+            for new, old in zip(larger[1:], self.buffer[1:], strict=True):
+                new[: len(old)] = old
+            self.buffer = larger._replace(state=self.buffer.state)
+
     @property
     def elapsed_s(self) -> float:
         """Seconds since the log was opened."""

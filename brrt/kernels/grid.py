@@ -57,16 +57,22 @@ def build_obstacles(world: World) -> Obstacles:
     least = np.concatenate([balls[:, :d] - balls[:, d:], boxes[:, :d]])
     most = np.concatenate([balls[:, :d] + balls[:, d:], boxes[:, d:]])
     extent = world.upper - world.lower
-    edge = (extent.prod() / max(1.0, _CELLS_PER_OBSTACLE * len(least))) ** (1 / d)
+    longest = float(extent.max())
+    volume = float((extent / longest).prod()) / max(1.0, _CELLS_PER_OBSTACLE * len(least))
+    edge = longest * max(volume ** (1 / d), 1 / _MAX_CELLS)
     while True:
-        shape = np.maximum(1, np.ceil(extent / edge)).astype(np.int64)
+        shape = np.maximum(1.0, np.ceil(extent / edge))  # may exceed int64 in flat worlds
+        if shape.prod() > _MAX_CELLS:
+            edge *= 1.5
+            continue
+        shape = shape.astype(np.int64)
         cell = extent / shape
         first = np.clip(np.floor((least - world.lower) / cell - _PAD), 0, shape - 1)
         last = np.clip(np.floor((most - world.lower) / cell + _PAD), 0, shape - 1)
         spans = (last - first + 1).astype(np.int64)
         entries = int(spans.prod(axis=1).sum())
         small = entries <= _ENTRIES_PER_OBSTACLE * len(least) + 4096
-        if shape.prod() <= _MAX_CELLS and small:
+        if small:
             break
         edge *= 1.5
     starts, items = _entries(first.astype(np.int64), spans, shape)
@@ -100,18 +106,26 @@ def _entries(
 
 
 @inlined
-def _cell_of(x: float, lower: float, per_length: float, count: int) -> int:
-    return max(min(int((x - lower) * per_length), count - 1), 0)
+def _cell_of(offset: float, per_length: float, count: int) -> int:
+    return max(min(int(offset * per_length), count - 1), 0)
 
 
 @inlined
-def _crossing(
-    x: float, step: float, inverse: float, lower: float, width: float, cell: int
-) -> float:
-    """Parameter at which a walk along one axis leaves a cell; never, where it stands still."""
+def _crossing(offset: float, step: float, inverse: float, width: float, cell: int) -> float:
+    """Parameter at which a walk along one axis leaves a cell; never, where it stands still.
+
+    `offset` is from the grid's corner: far from the origin, coordinates themselves would round
+    by more than obstacles are padded.
+    """
     if abs(step) < _TINY:
         return np.inf
-    return (lower + (cell + 1 if step > 0 else cell) * width - x) * inverse
+    return ((cell + 1 if step > 0 else cell) * width - offset) * inverse
+
+
+@inlined
+def _inverse(step: float) -> float:
+    """Reciprocal of a component; 0, which nobody looks at, where it counts as zero."""
+    return 0.0 if abs(step) < _TINY else 1.0 / step
 
 
 @inlined
@@ -146,22 +160,22 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
     ax, ay, az = A[i, 0], A[i, 1], 0.0
     dx, dy, dz = B[j, 0] - ax, B[j, 1] - ay, 0.0
     nx, ny = o.shape[0], o.shape[1]
-    lx, ly, lz = o.lower[0], o.lower[1], 0.0
+    ox, oy, oz = ax - o.lower[0], ay - o.lower[1], 0.0
     wx, wy, wz = o.cell[0], o.cell[1], 1.0
-    cx, cy, cz = _cell_of(ax, lx, o.per_length[0], nx), _cell_of(ay, ly, o.per_length[1], ny), 0
+    cx, cy, cz = _cell_of(ox, o.per_length[0], nx), _cell_of(oy, o.per_length[1], ny), 0
     nz = 1
     if d == 3:
         # A tuple of two has no constant index 2; `z` is one that the compiler looks up later.
         z = d - 1
         az = A[i, z]
         dz = B[j, z] - az
-        lz, wz, nz = o.lower[z], o.cell[z], o.shape[z]
-        cz = _cell_of(az, lz, o.per_length[z], nz)
-    ix, iy, iz = 1.0 / dx, 1.0 / dy, 1.0 / dz
+        oz, wz, nz = az - o.lower[z], o.cell[z], o.shape[z]
+        cz = _cell_of(oz, o.per_length[z], nz)
+    ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
     square = dx * dx + dy * dy + dz * dz
-    next_x = _crossing(ax, dx, ix, lx, wx, cx)
-    next_y = _crossing(ay, dy, iy, ly, wy, cy)
-    next_z = _crossing(az, dz, iz, lz, wz, cz)
+    next_x = _crossing(ox, dx, ix, wx, cx)
+    next_y = _crossing(oy, dy, iy, wy, cy)
+    next_z = _crossing(oz, dz, iz, wz, cz)
     while True:
         cell = cx + nx * (cy + ny * cz)
         for entry in range(o.starts[cell], o.starts[cell + 1]):
@@ -171,12 +185,15 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
                 radius = o.balls[item, d]
                 if d == 3:
                     pz = az - o.balls[item, 2]
-                # Rounding of the squared distance stays below this: 16 roundings of 1.1e-16.
-                slack = 8e-15 * (px * px + py * py + pz * pz + square + radius * radius)
+                # The distance rounds by less than this: 16 roundings of 1.1e-16, each of a length
+                # that is at most the sum. (Slack in the square would make small balls large.)
+                reach = radius + 2e-15 * (
+                    abs(px) + abs(py) + abs(pz) + abs(dx) + abs(dy) + abs(dz) + radius
+                )
                 if square > 0.0:
                     u = min(1.0, max(0.0, -(px * dx + py * dy + pz * dz) / square))
                     px, py, pz = px + u * dx, py + u * dy, pz + u * dz
-                if px * px + py * py + pz * pz <= radius * radius + slack:
+                if px * px + py * py + pz * pz <= reach * reach:
                     return True
             else:
                 box = item - n_balls
@@ -194,18 +211,18 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
             cx += 1 if dx > 0 else -1
             if cx < 0 or cx >= nx:
                 return False
-            next_x = _crossing(ax, dx, ix, lx, wx, cx)
+            next_x = _crossing(ox, dx, ix, wx, cx)
         elif next_y <= next_z:
             if next_y > 1.0:
                 return False
             cy += 1 if dy > 0 else -1
             if cy < 0 or cy >= ny:
                 return False
-            next_y = _crossing(ay, dy, iy, ly, wy, cy)
+            next_y = _crossing(oy, dy, iy, wy, cy)
         else:
             if next_z > 1.0:
                 return False
             cz += 1 if dz > 0 else -1
             if cz < 0 or cz >= nz:
                 return False
-            next_z = _crossing(az, dz, iz, lz, wz, cz)
+            next_z = _crossing(oz, dz, iz, wz, cz)

@@ -21,6 +21,9 @@ _STACK = 256
 _MEAN_FILL = 4
 """Room is planned for buckets with at least this many nodes; they come to hold about 10."""
 
+_AXIS, _LEFT, _RIGHT, _SIZE = range(4)
+"""Columns of `KdTree.cells`; a leaf has its bucket on the left."""
+
 _REBUILD_NEEDS = 4
 """Buckets that must be left for a full one to be split."""
 
@@ -34,12 +37,11 @@ class KdTree(NamedTuple):
     query finds those of a leaf in a few lines of the cache.
 
     Attributes:
-        axis: Axis that splits each cell, -1 for a leaf; shape (cells,).
-        split: Coordinate of the split, shape (cells,).
-        child: Cell below and cell above the split; for a leaf its bucket, twice; shape (cells, 2).
-        size: Nodes in each cell, shape (cells,).
-        low: Least coordinates of each cell's nodes, shape (cells, d).
-        high: Greatest coordinates of each cell's nodes, shape (cells, d).
+        cells: For each cell its splitting axis, the cells below and above, and its nodes; for a
+            leaf -1, its bucket, -1, and its nodes; shape (cells, 4).
+        boxes: Least and greatest coordinates of each cell's nodes, and where it splits; what a
+            query asks of a cell stands in two lines of the cache; shape (cells, 2 d + 1).
+        built: How many nodes each cell had when it was split or rebuilt, shape (cells,).
         points: Coordinates, 16 rows a bucket, shape (16 buckets, d).
         nodes: Node number of each row, shape (16 buckets,).
         counts: Nodes, cells and buckets in use, cells and buckets given back; shape (5,).
@@ -50,12 +52,9 @@ class KdTree(NamedTuple):
         work: Cells to rebuild, and which of the gathered nodes are theirs, shape (256, 3).
     """
 
-    axis: NDArray[np.int8]
-    split: Floats
-    child: NDArray[np.int32]
-    size: NDArray[np.int32]
-    low: Floats
-    high: Floats
+    cells: NDArray[np.int32]
+    boxes: Floats
+    built: NDArray[np.int32]
     points: Floats
     nodes: NDArray[np.int32]
     counts: NDArray[np.int64]
@@ -73,8 +72,8 @@ def rooted_kdtree(root: Floats, capacity: int) -> KdTree:
     """
     tree = _empty_kdtree(len(root), capacity)
     tree.counts[:3] = 1
-    tree.axis[0], tree.child[0], tree.size[0] = _LEAF, 0, 1
-    tree.low[0], tree.high[0], tree.points[0], tree.nodes[0] = root, root, root, 0
+    tree.cells[0] = _LEAF, 0, -1, 1
+    tree.boxes[0, :-1], tree.points[0], tree.nodes[0] = np.concatenate([root, root]), root, 0
     return tree
 
 
@@ -91,12 +90,9 @@ def _empty_kdtree(d: int, capacity: int) -> KdTree:
     buckets = capacity // _MEAN_FILL + 2 * _REBUILD_NEEDS
     cells = 2 * buckets
     return KdTree(
-        axis=np.empty(cells, np.int8),
-        split=np.empty(cells),
-        child=np.empty((cells, 2), np.int32),
-        size=np.empty(cells, np.int32),
-        low=np.empty((cells, d)),
-        high=np.empty((cells, d)),
+        cells=np.empty((cells, 4), np.int32),
+        boxes=np.empty((cells, 2 * d + 1)),
+        built=np.empty(cells, np.int32),
         points=np.empty((BUCKET * buckets, d)),
         nodes=np.empty(BUCKET * buckets, np.int32),
         counts=np.zeros(5, np.int64),
@@ -142,27 +138,27 @@ def _new_bucket(tree: KdTree) -> int:
 def _stretch(tree: KdTree, cell: int, q: Floats, node: int, d: int) -> None:
     """Let a cell's box reach a node."""
     for k in range(d):
-        tree.low[cell, k] = min(tree.low[cell, k], q[node, k])
-        tree.high[cell, k] = max(tree.high[cell, k], q[node, k])
+        tree.boxes[cell, k] = min(tree.boxes[cell, k], q[node, k])
+        tree.boxes[cell, d + k] = max(tree.boxes[cell, d + k], q[node, k])
 
 
 @inlined
 def _open_leaf(tree: KdTree, cell: int, bucket: int, d: int) -> None:
-    tree.axis[cell], tree.size[cell] = _LEAF, 0
-    tree.child[cell, 0], tree.child[cell, 1] = bucket, bucket
+    tree.cells[cell, _AXIS], tree.cells[cell, _SIZE] = _LEAF, 0
+    tree.cells[cell, _LEFT], tree.cells[cell, _RIGHT] = bucket, -1
     for k in range(d):
-        tree.low[cell, k], tree.high[cell, k] = np.inf, -np.inf
+        tree.boxes[cell, k], tree.boxes[cell, d + k] = np.inf, -np.inf
 
 
 @inlined
 def _put(tree: KdTree, cell: int, node: int, q: Floats, row: int, d: int) -> None:
     """Add a node that stands at q[row] to a leaf that has room."""
-    at = tree.child[cell, 0] * BUCKET + tree.size[cell]
+    at = tree.cells[cell, _LEFT] * BUCKET + tree.cells[cell, _SIZE]
     _stretch(tree, cell, q, row, d)
     for k in range(d):
         tree.points[at, k] = q[row, k]
     tree.nodes[at] = node
-    tree.size[cell] += 1
+    tree.cells[cell, _SIZE] += 1
 
 
 @inlined
@@ -170,8 +166,8 @@ def _widest_axis(tree: KdTree, cell: int, d: int) -> int:
     """Return the longest side of a cell's box; -1 where all its nodes coincide."""
     axis, widest = -1, 0.0
     for k in range(d):
-        if tree.high[cell, k] - tree.low[cell, k] > widest:
-            axis, widest = k, tree.high[cell, k] - tree.low[cell, k]
+        if tree.boxes[cell, d + k] - tree.boxes[cell, k] > widest:
+            axis, widest = k, tree.boxes[cell, d + k] - tree.boxes[cell, k]
     return axis
 
 
@@ -183,15 +179,15 @@ def _gather(tree: KdTree, root: int) -> int:
     while top > 0:
         top -= 1
         cell = tree.stack[top]
-        if tree.axis[cell] == _LEAF:
-            bucket = tree.child[cell, 0]
-            for at in range(bucket * BUCKET, bucket * BUCKET + tree.size[cell]):
+        if tree.cells[cell, _AXIS] == _LEAF:
+            bucket = tree.cells[cell, _LEFT]
+            for at in range(bucket * BUCKET, bucket * BUCKET + tree.cells[cell, _SIZE]):
                 tree.gathered[n] = tree.nodes[at]
                 n += 1
             tree.free_buckets[tree.counts[_FREE_BUCKETS]] = bucket
             tree.counts[_FREE_BUCKETS] += 1
         else:
-            tree.stack[top], tree.stack[top + 1] = tree.child[cell, 0], tree.child[cell, 1]
+            tree.stack[top], tree.stack[top + 1] = tree.cells[cell, _LEFT], tree.cells[cell, _RIGHT]
             top += 2
         if cell != root:
             tree.free_cells[tree.counts[_FREE_CELLS]] = cell
@@ -239,16 +235,16 @@ def _median(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int) -> f
 @borrowing
 def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
     """Build a cell anew, halving at the median of its longest side down to the buckets."""
-    if _buckets_left(tree) < max(tree.size[root] // 4, _REBUILD_NEEDS):
+    if _buckets_left(tree) < max(tree.cells[root, _SIZE] // 4, _REBUILD_NEEDS):
         return
     tree.work[0, 0], tree.work[0, 1], tree.work[0, 2] = root, 0, _gather(tree, root)
     ids, top = tree.gathered, 1
     while top > 0:
         top -= 1
         cell, lo, hi = tree.work[top, 0], tree.work[top, 1], tree.work[top, 2]
-        tree.size[cell] = hi - lo
+        tree.cells[cell, _SIZE] = tree.built[cell] = hi - lo
         for k in range(d):
-            tree.low[cell, k], tree.high[cell, k] = np.inf, -np.inf
+            tree.boxes[cell, k], tree.boxes[cell, d + k] = np.inf, -np.inf
         for i in range(lo, hi):
             _stretch(tree, cell, q, ids[i], d)
         axis = _widest_axis(tree, cell, d)
@@ -258,7 +254,7 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
                 _put(tree, cell, ids[i], q, ids[i], d)
             continue
         split = _median(ids, lo, hi, q, axis)
-        if split <= tree.low[cell, axis]:
+        if split <= tree.boxes[cell, axis]:
             # Half of them share the least coordinate: split right above it.
             least, split = split, np.inf
             for i in range(lo, hi):
@@ -266,32 +262,40 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
                     split = min(split, q[ids[i], axis])
         middle = _partition(ids, lo, hi, q, axis, split)
         left, right = _new_cell(tree), _new_cell(tree)
-        tree.axis[cell], tree.split[cell] = axis, split
-        tree.child[cell, 0], tree.child[cell, 1] = left, right
+        tree.cells[cell, _AXIS], tree.boxes[cell, 2 * d] = axis, split
+        tree.cells[cell, _LEFT], tree.cells[cell, _RIGHT] = left, right
         tree.work[top, 0], tree.work[top, 1], tree.work[top, 2] = left, lo, middle
         tree.work[top + 1, 0], tree.work[top + 1, 1], tree.work[top + 1, 2] = right, middle, hi
         top += 2
 
 
+@inlined
+def _side(tree: KdTree, cell: int, x: float, d: int) -> int:
+    """Return the child that holds a coordinate along the splitting axis."""
+    return int(tree.cells[cell, _RIGHT if x >= tree.boxes[cell, 2 * d] else _LEFT])
+
+
 @borrowing
 def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
     """Share a full leaf's nodes between two new leaves, at the mean of its longest side."""
-    bucket, other = tree.child[cell, 0], _new_bucket(tree)
+    bucket, other = tree.cells[cell, _LEFT], _new_bucket(tree)
     left, right = _new_cell(tree), _new_cell(tree)
     first = bucket * BUCKET
     mean = 0.0
     for at in range(first, first + BUCKET):
         mean += tree.points[at, axis] / BUCKET
-    # Rounding could put the mean at the least coordinate, and then nothing would lie below it.
-    split = mean if mean > tree.low[cell, axis] else tree.high[cell, axis]
+    # Rounding could put the mean beyond them all, and then one leaf would get every node.
+    low, high = tree.boxes[cell, axis], tree.boxes[cell, d + axis]
+    split = mean if low < mean <= high else high
     _open_leaf(tree, left, bucket, d)
     _open_leaf(tree, right, other, d)
     for at in range(first, first + BUCKET):
         # The left leaf takes over the bucket, and fills it no faster than it is read.
         child = right if tree.points[at, axis] >= split else left
         _put(tree, child, tree.nodes[at], tree.points, at, d)
-    tree.axis[cell], tree.split[cell] = axis, split
-    tree.child[cell, 0], tree.child[cell, 1] = left, right
+    tree.cells[cell, _AXIS], tree.boxes[cell, 2 * d] = axis, split
+    tree.cells[cell, _LEFT], tree.cells[cell, _RIGHT] = left, right
+    tree.built[cell] = BUCKET
 
 
 @inlined
@@ -304,21 +308,26 @@ def insert(tree: KdTree, space: Any, q: Floats, node: int) -> None:
     """
     d = len(space.lower)
     cell, lopsided = 0, -1
-    while tree.axis[cell] != _LEAF:
+    while tree.cells[cell, _AXIS] != _LEAF:
         _stretch(tree, cell, q, node, d)
-        tree.size[cell] += 1
-        child = tree.child[cell, 1 if q[node, tree.axis[cell]] >= tree.split[cell] else 0]
-        if lopsided < 0 and 4 * tree.size[child] > 3 * tree.size[cell] + 4 * BUCKET:
+        tree.cells[cell, _SIZE] += 1
+        child = _side(tree, cell, q[node, tree.cells[cell, _AXIS]], d)
+        size = tree.cells[cell, _SIZE]
+        uneven = 4 * tree.cells[child, _SIZE] > 3 * size + 4 * BUCKET
+        # Halves become that uneven only once there are twice as many nodes. A cell that cannot be
+        # halved, because most of its nodes share a coordinate, has to wait as long.
+        if lopsided < 0 and uneven and size >= 2 * tree.built[cell]:
             lopsided = cell
         cell = child
-    if tree.size[cell] == BUCKET:
+    if tree.cells[cell, _SIZE] == BUCKET:
+        # The box with the new node in it: 16 that coincide must still make way for another.
+        _stretch(tree, cell, q, node, d)
         axis = _widest_axis(tree, cell, d)
         if axis < 0:
             return
         _split(tree, cell, axis, d)
-        _stretch(tree, cell, q, node, d)
-        tree.size[cell] += 1
-        cell = tree.child[cell, 1 if q[node, axis] >= tree.split[cell] else 0]
+        tree.cells[cell, _SIZE] += 1
+        cell = _side(tree, cell, q[node, axis], d)
     _put(tree, cell, node, q, node, d)
     tree.counts[_NODES] += 1
     if lopsided >= 0:
@@ -332,16 +341,16 @@ def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:
     Each cell knows the box around its nodes. The half-space that a split leaves would not do:
     most samples lie far from a young tree, and its outer cells would have no end on that side.
     """
-    stack = tree.stack
+    d, stack = len(space.lower), tree.stack
     best, node, cell, top = np.inf, -1, 0, 0
     while True:
-        while tree.axis[cell] != _LEAF:
-            side = 1 if Q[row, tree.axis[cell]] >= tree.split[cell] else 0
-            stack[top] = tree.child[cell, 1 - side]
+        while tree.cells[cell, _AXIS] != _LEAF:
+            side = 1 if Q[row, tree.cells[cell, _AXIS]] >= tree.boxes[cell, 2 * d] else 0
+            stack[top] = tree.cells[cell, _RIGHT - side]
             top += 1
-            cell = tree.child[cell, side]
-        first = tree.child[cell, 0] * BUCKET
-        for at in range(first, first + tree.size[cell]):
+            cell = tree.cells[cell, _LEFT + side]
+        first = tree.cells[cell, _LEFT] * BUCKET
+        for at in range(first, first + tree.cells[cell, _SIZE]):
             measured = measure(space, tree.points, at, Q, row)
             if measured < best:
                 best, node = measured, tree.nodes[at]
@@ -350,5 +359,5 @@ def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:
                 return node
             top -= 1
             cell = stack[top]
-            if box_measure(space, tree.low, tree.high, cell, Q, row) < best:
+            if box_measure(space, tree.boxes, cell, Q, row) < best:
                 break

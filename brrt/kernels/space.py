@@ -44,9 +44,9 @@ def length(space: Any, measured: float) -> float:
 
 
 @_by_robot
-def box_measure(space: Any, low: Floats, high: Floats, b: int, Q: Floats, i: int) -> float:
-    """Return a lower bound of `measure` from Q[i] to anything between low[b] and high[b]."""
-    return float(space.box_measure(space, low, high, b, Q, i))
+def box_measure(space: Any, boxes: Floats, b: int, Q: Floats, i: int) -> float:
+    """Return a lower bound of `measure` from Q[i] to anything in boxes[b]: least, then greatest."""
+    return float(space.box_measure(space, boxes, b, Q, i))
 
 
 @_by_robot

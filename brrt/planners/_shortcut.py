@@ -54,7 +54,8 @@ def attempt_all(
                 for axis in range(len(space.lower)):
                     path[i + 1 + k - j, axis] = path[k, axis]
             counts[WAYPOINTS] = n - (j - i - 1)
-            cost[0] = path_cost(path, counts[WAYPOINTS], space)
+            # Along a straight line the sum may round up; the cost never rises.
+            cost[0] = min(cost[0], path_cost(path, counts[WAYPOINTS], space))
         emit(log, SHORTCUT, iteration, i, j, int(accepted), cost[0], path, 0)
 
 

@@ -55,31 +55,36 @@ class RRT(Planner):
             slices=self.slices if self.keep_intermediate else 1,
             count_failed=self.count_failed,
         )
-        nodes = 2 + stop.iterations * options.slices
+        nodes = 2 + (stop.iterations + 1) * options.slices
         tree = _planted_tree(problem, min(nodes, _RESERVED_NODES))
         counts, draw_limit = tree.counts, stop.iterations * _DRAWS_PER_ITERATION
         if self.count_failed:
             draw_limit = stop.iterations
+        if stop.draws is not None:
+            draw_limit = min(draw_limit, stop.draws)
 
+        log.reserve(options.slices + 8)
         log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
         log.emit(Kind.EDGE, 0, tree=0, node=0, parent=-1, cost=0.0, q=problem.start)
         began = log.elapsed_s
         status = None
         while status is None:
-            status = stop.reached(int(counts[_rrt.COUNTED]), log.elapsed_s - began)
-            if status is not None:
-                break
+            due = stop.reached(int(counts[_rrt.COUNTED]), log.elapsed_s - began)
+            # Even where the end is due, the kernel still tests the newest node for the goal.
+            share = stop.share(int(counts[_rrt.COUNTED])) if due is None else 0
+            limit = counts[_rrt.COUNTED] + share
             log.tick()
-            limit = counts[_rrt.COUNTED] + stop.share(int(counts[_rrt.COUNTED]))
             result = _rrt.advance(tree, space, rng, log.buffer, options, limit, draw_limit)
-            if result == _rrt.SOLVED:
-                status = Status.SOLVED
-            elif result == _rrt.TREE_FULL:
-                tree = _grown_tree(tree)
-            elif counts[_rrt.DRAWS] >= draw_limit:
-                status = Status.ITERATION_LIMIT
             if result == _rrt.BATCH_FULL:
                 yield log.drain()
+            elif result == _rrt.TREE_FULL:
+                tree = _grown_tree(tree)
+            elif result == _rrt.SOLVED:
+                status = Status.SOLVED
+            elif due is None and counts[_rrt.DRAWS] >= draw_limit:
+                status = Status.ITERATION_LIMIT
+            else:
+                status = due
         iteration = int(counts[_rrt.DRAWS])
         if log.room < 2:
             yield log.drain()

@@ -15,11 +15,13 @@ class Stop:
 
     Attributes:
         iterations: Iterations that a planner may count.
+        draws: Draws that it may make, whether they count or not; None for no limit.
         time_s: Seconds it may take; None for no limit, and then no event depends on the clock.
         interrupted: Set it to stop the run at the next batch.
     """
 
     iterations: int = 1_000_000
+    draws: int | None = None
     time_s: float | None = None
     interrupted: bool = False
 

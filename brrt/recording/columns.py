@@ -1,13 +1,112 @@
-"""Events as Arrow columns, as Rerun takes them, and back; and checksums over them."""
+"""Events as Arrow columns, the way Rerun takes them, and back; and checksums over them."""
 
 import json
 import zlib
-from collections.abc import Buffer, Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
+import pyarrow  # noqa: ICN001 - it gets that name below
 import rerun as rr
 from numpy.typing import NDArray
 
-from brrt.events import Events, Field, Table
+from brrt.events import Field, Kind, Table
+
+pa: Any = pyarrow  # mypy knows none of its names
+
+Columns = Mapping[str, NDArray[Any]]
+
+TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
+"""The timelines, and the column of the events that each holds."""
+
+
+def split(table: Table) -> Columns:
+    """Return the columns of events by name, each without gaps, as pyarrow and zlib want them."""
+    return {name: np.ascontiguousarray(table[name]) for name in table.dtype.names or ()}
+
+
+def time_columns(events: Columns | Table) -> list[rr.TimeColumn]:
+    """Return the timelines of events, exact to the nanosecond."""
+    return [
+        rr.TimeColumn("iteration", sequence=np.ascontiguousarray(events["iteration"])),
+        rr.TimeColumn("event", sequence=np.ascontiguousarray(events["seq"])),
+        rr.TimeColumn("t", duration=events["t"].astype("m8[ns]")),
+    ]
+
+
+def to_arrow(field: Field, values: NDArray[Any]) -> Any:
+    """Return a field of any type, without gaps, as an Arrow array with one value a row."""
+    if field.type == "q[]":
+        flat = [np.ravel(row) for row in values]
+        offsets = np.cumsum([0, *map(len, flat)], dtype=np.int32)
+        return pa.ListArray.from_arrays(offsets, pa.array(np.concatenate(flat), pa.float64()))
+    if field.type == "q":
+        return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
+    return pa.array(values)
+
+
+def from_arrow(field: Field, column: Any, dof: int) -> NDArray[Any]:
+    """Undo `to_arrow`; Rerun has wrapped each value into a list.
+
+    Raises:
+        ValueError: There is not one value a row.
+    """
+    flat = column.flatten()
+    if field.type == "q[]":
+        ends = np.cumsum(np.asarray(column.value_lengths()))
+        rows = np.empty(len(ends), object)
+        for i, row in enumerate(np.split(flat.to_numpy(), ends[:-1])):
+            rows[i] = row.reshape(-1, dof)
+        return rows
+    if len(flat) != len(column):
+        raise ValueError(f"{field.name}: {len(flat)} values in {len(column)} rows")
+    if field.type == "q":
+        return np.asarray(flat.flatten().to_numpy().reshape(-1, dof))
+    return np.asarray(flat.to_numpy(zero_copy_only=False))
+
+
+def line_strips(places: NDArray[np.float32], lengths: int | Sequence[int]) -> Any:
+    """Return line strips as Arrow holds them; Rerun's own conversion takes ten times longer.
+
+    Args:
+        places: Their points, one after the other, shape (n, 2) or (n, 3).
+        lengths: Points of each strip; one number if all are equal.
+    """
+    if isinstance(lengths, int):
+        offsets = np.arange(0, len(places) + 1, lengths, dtype=np.int32)
+    else:
+        offsets = np.cumsum([0, *lengths], dtype=np.int32)
+    flat = places.shape[1] == 2
+    batch: Any = rr.components.LineStrip2DBatch if flat else rr.components.LineStrip3DBatch
+    arrow = batch._ARROW_DATATYPE  # noqa: SLF001 - only this very type is taken as it is
+    points = pa.FixedSizeListArray.from_arrays(places.reshape(-1), type=arrow.value_type)
+    return pa.ListArray.from_arrays(offsets, points, type=arrow)
+
+
+class Checksums:
+    """CRC-32 of each column of the events, however they are cut into batches.
+
+    Rerun's format has none: of 300 files with one bit flipped, 201 were read without an error.
+    """
+
+    def __init__(self) -> None:
+        self._sums: dict[str, int] = {}
+
+    def add(self, name: str, data: Any) -> None:
+        """Take in the next part of a column, bytes or an array without gaps."""
+        self._sums[name] = zlib.crc32(data, self._sums.get(name, 0))
+
+    def write(self, kind: Kind, columns: Columns) -> None:
+        """Take in events of one kind."""
+        for column, values in columns.items():
+            name = f"{kind.label}.{column}"
+            if not values.dtype.hasobject:
+                self.add(name, values)
+                continue
+            for row in values:
+                self.add(f"{name} sizes", row.size.to_bytes(8, "little"))
+                self.add(name, np.ascontiguousarray(row))
+
+    def to_json(self) -> str:
+        """Return the sums as text, equal for equal events."""
+        return json.dumps(self._sums, sort_keys=True)

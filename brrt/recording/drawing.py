@@ -8,26 +8,18 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status, Table
 from brrt.recording import scene
+from brrt.recording.columns import line_strips, time_columns
+from brrt.recording.tree_sketch import DRAWN_IN_FULL, TreeSketch
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-Indices = NDArray[np.int64]
-Points = NDArray[np.float32]
-
-_KEPT_NODES = 1 << 22
-"""Nodes of a tree whose positions are kept in memory (12 bytes each in 3D) to draw from."""
-
-_DRAWN_IN_FULL = 50_000
-"""Nodes of a tree up to which every edge is drawn."""
-
-_CELLS = 1 << 16
-"""Cells of the grid that thins out what comes after: each then takes a single edge."""
+_FADING_IN_FULL, _FADING_STRIDE = 10_000, 16
+"""Samples of a source, or rejections for a reason, that are all drawn; then one of so many."""
 
 _FADING_ROW = 16
 """Samples or rejections in a row; they appear and vanish by rows."""
@@ -38,17 +30,8 @@ _LONGEST_SHOWN = 1000
 _MOMENT = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
 
 
-def time_columns(rows: Table) -> list[Any]:
-    """Return the three timelines of events, from the columns that every event has."""
-    return [
-        rr.TimeColumn("iteration", sequence=np.ascontiguousarray(rows["iteration"])),
-        rr.TimeColumn("event", sequence=np.ascontiguousarray(rows["seq"])),
-        rr.TimeColumn("t", duration=rows["t"].astype("m8[ns]")),
-    ]
-
-
-def growing_rows(first: int, count: int) -> Indices:
-    """Cut items into rows of about 1 % of what there is, from 1 item up to 256.
+def growing_rows(first: int, count: int) -> NDArray[np.int64]:
+    """Cut items into rows of about 1 % of what there is, from 1 item up to 1024.
 
     A viewer takes time for each row, and shows a row at once: so the first edges of a tree appear
     one by one, and the many that follow in rows.
@@ -61,256 +44,199 @@ def growing_rows(first: int, count: int) -> Indices:
         The end of each row, exclusive, counted from `first`; the last is `count`.
     """
     number = np.arange(first, first + count)
-    row = np.where(number < 1 << 14, 64 * np.log2(number + 1.0), number / 256).astype(np.int64)
+    row = np.where(number < 1 << 16, 64 * np.log2(number + 1.0), number / 1024).astype(np.int64)
     return np.append(np.flatnonzero(np.diff(row)) + 1, count)
-
-
-def even_rows(count: int) -> Indices:
-    """Cut items into rows of one size, the last one apart."""
-    return np.append(np.arange(_FADING_ROW, count, _FADING_ROW), count)
 
 
 class Drawing:
     """Draws batches of events into a recording.
 
     Args:
-        rec: A `rerun.RecordingStream`.
+        rec: The recording.
         manifest: The run's.
         world: The run's.
     """
 
-    def __init__(self, rec: Any, manifest: Manifest, world: World) -> None:  # noqa: ANN401
+    def __init__(self, rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
         self._rec, self._world, self._dim = rec, world, manifest.dim
-        self._trees: dict[int, _Tree] = {}
-        self._edges = 0
-        self._rejects = dict.fromkeys(Reason, 0)
-        self._path: NDArray[np.float64] | None = None
-        self._cost = np.inf
         flat = scene.is_flat(manifest)
         self._lines: Any = rr.LineStrips2D if flat else rr.LineStrips3D
         self._points: Any = rr.Points2D if flat else rr.Points3D
+        self._trees: dict[int, TreeSketch] = {}
+        self._edges, self._rejects = 0, dict.fromkeys(Reason, 0)
+        self._faded: dict[str, int] = {}
+        self._path: NDArray[np.float64] | None = None
+        self._raw_cost = np.inf
+        self._news: list[tuple[Any, str]] = []
         scene.log_scene(rec, manifest, world)
         self._log_styles()
 
     def write(self, events: Events) -> None:
         """Draw a batch."""
-        news = [*self._draw_edges(events[Kind.EDGE]), *self._draw_paths(events)]
-        self._draw_rejects(events)
+        self._draw_edges(events[Kind.EDGE])
+        self._draw_rejects(events[Kind.REJECT], events[Kind.EDGE])
         self._draw_samples(events[Kind.SAMPLE])
-        news += [(event, _phase_text(event)) for event in events[Kind.PHASE]]
-        if news:
-            news.sort(key=lambda item: int(item[0]["seq"]))
-            columns = rr.TextLog.columns(
-                text=[text for _, text in news], level=["INFO"] * len(news)
-            )
-            self._rec.send_columns("/log", time_columns(_moments(e for e, _ in news)), columns)
+        self._draw_paths(events[Kind.PATH], events[Kind.SHORTCUT])
+        self._news += [(event, _phase_text(event)) for event in events[Kind.PHASE]]
+        self._tell_news()
 
     def _log_styles(self) -> None:
-        for stage, (name, colour, radius) in scene.PATHS.items():
+        for stage in Stage:
+            name, colour, radius = scene.path_style(stage)
             self._style(f"/world/path/{name}", self._lines, colour, -radius, 40.0 + stage)
-        for source, colour in scene.SAMPLES.items():
+        for source in Source:
+            colour = scene.SAMPLES.get(source, scene.OTHER)
             self._style(f"/world/samples/{_label(source)}", self._points, colour, -2, 30.0)
-        for reason, colour in scene.REJECTS.items():
+        for reason in Reason:
+            colour = scene.REJECTS.get(reason, scene.OTHER)
             self._style(f"/world/rejected/{_label(reason)}", self._lines, colour, -0.5, 10.0)
-            self._plot(f"/series/rejected/{_label(reason)}", _label(reason), colour)
-        cost = scene.PATHS[Stage.SMOOTHED][1]
-        self._plot("/series/cost", "cost", cost)
-        self._rec.log(
-            "/series/cost", rr.SeriesPoints(colors=cost, marker_sizes=3, names="cost"), static=True
-        )
+            self._plot_style(f"/series/rejected/{_label(reason)}", _label(reason), colour)
+        gold = scene.path_style(Stage.SMOOTHED)[1]
+        self._plot_style("/series/cost", "cost", gold)
+        dots = rr.SeriesPoints(colors=gold, marker_sizes=3, names="cost")
+        self._rec.log("/series/cost", dots, static=True)
 
     def _style(
-        self,
-        entity: str,
-        archetype: Any,  # noqa: ANN401
-        colour: scene.Colour,
-        radius: float,
-        order: float,
+        self, entity: str, archetype: Any, colour: scene.Colour, radius: float, layer: float
     ) -> None:
-        """Log what all rows of an entity share. Negative radii are points of the screen."""
-        layer = {"draw_order": order} if self._dim == 2 else {}  # noqa: PLR2004
-        style = archetype.from_fields(colors=colour, radii=radius, **layer)
+        """Log what all rows of an entity share; a negative radius is in points of the screen."""
+        order = {"draw_order": layer} if self._dim == 2 else {}
+        style = archetype.from_fields(colors=colour, radii=radius, **order)
         self._rec.log(entity, style, static=True)
 
-    def _plot(self, entity: str, name: str, colour: scene.Colour) -> None:
-        self._rec.log(entity, rr.SeriesLines(names=name, colors=colour, widths=1.5), static=True)
+    def _plot_style(self, entity: str, name: str, colour: scene.Colour) -> None:
+        line = rr.SeriesLines(names=name.replace("_", " "), colors=colour, widths=1.5)
+        self._rec.log(entity, line, static=True)
 
-    def _send(self, entity: str, rows: Table, ends: Indices, columns: Any) -> None:  # noqa: ANN401
+    def _send(self, entity: str, rows: Table, ends: NDArray[np.int64], columns: Any) -> None:
         """Send items in rows; each row has the time of its last event."""
         parts = columns.partition(np.diff(ends, prepend=0))
         self._rec.send_columns(entity, time_columns(rows[ends - 1]), parts)
 
-    def _strips(self, places: Points, lengths: int | Iterable[int]) -> Any:  # noqa: ANN401
-        """Return line strips as Arrow wants them; Rerun's own conversion takes ten times longer.
+    def _plot(self, entity: str, rows: Table, values: Any) -> None:
+        self._rec.send_columns(entity, time_columns(rows), rr.Scalars.columns(scalars=values))
 
-        Args:
-            places: Their points, one after the other, shape (n, dim).
-            lengths: Points in each strip; one number if all are equal.
-        """
-        if isinstance(lengths, int):
-            offsets = np.arange(0, len(places) + 1, lengths, dtype=np.int32)
-        else:
-            offsets = np.cumsum([0, *lengths], dtype=np.int32)
-        flat = rr.components.LineStrip2DBatch if self._dim == 2 else rr.components.LineStrip3DBatch  # noqa: PLR2004
-        kind = flat._ARROW_DATATYPE  # noqa: SLF001 - only this very type is taken as it is
-        points = pa.FixedSizeListArray.from_arrays(places.reshape(-1), type=kind.value_type)
-        return self._lines.columns(strips=pa.ListArray.from_arrays(offsets, points, type=kind))
-
-    def _draw_edges(self, table: Table) -> list[tuple[Any, str]]:
-        news: list[tuple[Any, str]] = []
+    def _draw_edges(self, table: Table) -> None:
         for number in np.unique(table["tree"]).tolist():
-            rows = table[table["tree"] == number]
-            entity, name = scene.tree_entity(number), scene.tree_entity(number).rsplit("/")[-1]
+            name, colour = scene.tree_style(number)
             if number not in self._trees:
-                self._trees[number] = _Tree(self._world)
-                colour = scene.tree_colour(number)
-                self._style(entity, self._lines, colour, -0.75, 20.0)
-                self._plot(f"/series/nodes/{name}", f"{name} tree", colour)
-            tree = self._trees[number]
+                self._trees[number] = TreeSketch(self._world)
+                self._style(f"/world/tree/{name}", self._lines, colour, -0.75, 20.0)
+                self._plot_style(f"/series/nodes/{name}", f"{name} tree", colour)
+            tree, mine = self._trees[number], table["tree"] == number
+            rows = table if mine.all() else table[mine]
             ends = growing_rows(tree.nodes, len(rows))
-            self._rec.send_columns(
-                f"/series/nodes/{name}",
-                time_columns(rows[ends - 1]),
-                rr.Scalars.columns(scalars=tree.nodes + ends.astype(np.float64)),
-            )
-            was_thin, before = tree.thinned, tree.drawn
+            self._plot(f"/series/nodes/{name}", rows[ends - 1], tree.nodes + ends)
+            if tree.nodes <= DRAWN_IN_FULL < tree.nodes + len(rows):
+                limit = f"beyond {DRAWN_IN_FULL:,} nodes only edges to new places are drawn"
+                self._news.append((rows[-1], f"{name} tree: {limit}"))
+            before = tree.drawn
             strips, drawn = tree.join(rows)
             if len(drawn):
+                lines = self._lines.columns(strips=line_strips(strips, 2))
                 ends = growing_rows(before, len(drawn))
-                self._send(
-                    entity, rows[drawn], ends, self._strips(strips.reshape(-1, self._dim), 2)
-                )
-            if tree.thinned and not was_thin:
-                text = f"{name} tree has {_DRAWN_IN_FULL:,} nodes: now only edges into empty space are drawn"
-                news.append((rows[-1], text))
-        return news
+                self._send(f"/world/tree/{name}", rows[drawn], ends, lines)
 
     def _draw_samples(self, table: Table) -> None:
-        for source in scene.SAMPLES:
-            rows = table[table["source"] == source]
+        for source in Source:
+            which = np.flatnonzero(table["source"] == source)
+            rows = self._fading(table, which, f"{_label(source)} samples")
             if len(rows):
-                columns = self._points.columns(positions=_places(rows["q"], self._dim))
-                self._send(f"/world/samples/{_label(source)}", rows, even_rows(len(rows)), columns)
+                points = self._points.columns(positions=scene.places(rows["q"], self._dim))
+                self._send(f"/world/samples/{_label(source)}", rows, _even_rows(len(rows)), points)
 
-    def _draw_rejects(self, events: Events) -> None:
-        table, edges = events[Kind.REJECT], events[Kind.EDGE]
+    def _draw_rejects(self, table: Table, edges: Table) -> None:
         before = self._edges + sum(self._rejects.values())
-        for reason in scene.REJECTS:
-            rows = table[table["reason"] == reason]
-            if not len(rows):
-                continue
-            strips = np.empty((len(rows), 2, self._dim), np.float32)
-            for number, tree in self._trees.items():
-                mine = rows["tree"] == number
-                strips[mine, 0] = tree.places(rows["node"][mine])
-            strips[:, 1] = _places(rows["q"], self._dim)
-            columns = self._strips(strips.reshape(-1, self._dim), 2)
-            self._send(f"/world/rejected/{_label(reason)}", rows, even_rows(len(rows)), columns)
-
-            ends = growing_rows(self._rejects[reason], len(rows))
-            at = rows["seq"][ends - 1]
-            tried = before + sum(np.searchsorted(t["seq"], at, "right") for t in (table, edges))
-            share = 100 * (self._rejects[reason] + ends) / tried
-            self._rec.send_columns(
-                f"/series/rejected/{_label(reason)}",
-                time_columns(rows[ends - 1]),
-                rr.Scalars.columns(scalars=share),
-            )
-            self._rejects[reason] += len(rows)
+        for reason in Reason:
+            which = np.flatnonzero(table["reason"] == reason)
+            if len(which):
+                self._plot_rejects(reason, before, table, which, edges)
+            rows = self._fading(table, which, f"{_label(reason)} rejections")
+            if len(rows):
+                lines = self._lines.columns(strips=line_strips(self._attempts(rows), 2))
+                self._send(f"/world/rejected/{_label(reason)}", rows, _even_rows(len(rows)), lines)
         self._edges += len(edges)
 
-    def _draw_paths(self, events: Events) -> list[tuple[Any, str]]:
-        """Draw the paths, and each one between them as shortcuts are accepted."""
-        shortcuts = events[Kind.SHORTCUT]
-        changes = [(event, None) for event in shortcuts[shortcuts["accepted"]]]
-        changes += [(event, Stage(int(event["stage"]))) for event in events[Kind.PATH]]
+    def _attempts(self, rejects: Table) -> NDArray[np.float32]:
+        """Return where each extension left from and wanted to go, shape (2 n, dim)."""
+        ends = np.full((len(rejects), 2, self._dim), np.nan, np.float32)
+        for number, tree in self._trees.items():
+            mine = rejects["tree"] == number
+            ends[mine, 0] = tree.places(rejects["node"][mine])
+        ends[:, 1] = scene.places(rejects["q"], self._dim)
+        return ends.reshape(-1, self._dim)
+
+    def _plot_rejects(
+        self, reason: Reason, before: int, table: Table, which: NDArray[np.int64], edges: Table
+    ) -> None:
+        """Plot which part of all extensions so far was rejected for a reason."""
+        have = self._rejects[reason]
+        ends = growing_rows(have, len(which))
+        rows = table[which[ends - 1]]
+        tried = before + sum(
+            np.searchsorted(t["seq"], rows["seq"], "right") for t in (table, edges)
+        )
+        self._plot(f"/series/rejected/{_label(reason)}", rows, 100 * (have + ends) / tried)
+        self._rejects[reason] = have + len(which)
+
+    def _fading(self, table: Table, which: NDArray[np.int64], what: str) -> Table:
+        """Return the rows `which` of a table, thinned out if there have been many."""
+        first = self._faded.get(what, 0)
+        self._faded[what] = first + len(which)
+        if first <= _FADING_IN_FULL < first + len(which):
+            text = f"{what}: beyond {_FADING_IN_FULL:,} one in {_FADING_STRIDE} is drawn"
+            self._news.append((table[which[-1]], text))
+        number = np.arange(first, first + len(which))
+        shown = (number < _FADING_IN_FULL) | (number % _FADING_STRIDE == 0)
+        rows: Table = table[which[shown]]
+        return rows
+
+    def _draw_paths(self, paths: Table, shortcuts: Table) -> None:
+        """Draw each path, and those between them as shortcuts are accepted."""
+        changes: list[tuple[Any, Stage | None]]
+        changes = [(event, Stage(int(event["stage"]))) for event in paths]
+        changes += [(event, None) for event in shortcuts[shortcuts["accepted"]]]
         changes.sort(key=lambda change: int(change[0]["seq"]))
-        drawn: dict[Stage, list[tuple[Any, Points]]] = {}
-        news = []
+        drawn: dict[Stage, list[tuple[Any, NDArray[np.float32]]]] = {}
         for event, stage in changes:
             if stage is not None:
-                news.append((event, self._path_text(event, stage)))
                 self._path = event["waypoints"]
+                self._news.append((event, self._path_text(event, stage)))
             elif self._path is not None:
                 self._path = np.delete(self._path, slice(event["i"] + 1, event["j"]), axis=0)
             if self._path is not None and (stage is not None or len(self._path) <= _LONGEST_SHOWN):
-                place = _places(self._path, self._dim)
-                drawn.setdefault(Stage.SMOOTHED if stage is None else stage, []).append((event, place))
+                shown = Stage.SMOOTHED if stage is None else stage
+                drawn.setdefault(shown, []).append((event, scene.places(self._path, self._dim)))
         for stage, items in drawn.items():
-            columns = self._strips(
-                np.concatenate([p for _, p in items]), [len(p) for _, p in items]
-            )
-            when = time_columns(_moments(e for e, _ in items))
-            self._rec.send_columns(f"/world/path/{scene.PATHS[stage][0]}", when, columns)
+            places = [place for _, place in items]
+            strips = line_strips(np.concatenate(places), [len(place) for place in places])
+            rows = _moments(event for event, _ in items)
+            entity = f"/world/path/{scene.path_style(stage)[0]}"
+            self._rec.send_columns(entity, time_columns(rows), self._lines.columns(strips=strips))
         if changes:
-            costs = rr.Scalars.columns(scalars=[float(event["cost"]) for event, _ in changes])
-            self._rec.send_columns(
-                "/series/cost", time_columns(_moments(e for e, _ in changes)), costs
-            )
-        return news
+            costs = [float(event["cost"]) for event, _ in changes]
+            self._plot("/series/cost", _moments(event for event, _ in changes), costs)
 
-    def _path_text(self, event: Any, stage: Stage) -> str:  # noqa: ANN401
+    def _path_text(self, event: Any, stage: Stage) -> str:
         cost, waypoints = float(event["cost"]), len(event["waypoints"])
-        text = f"{scene.PATHS[stage][0]} path: cost {cost:.6g}, {waypoints} waypoints"
-        if stage is Stage.SMOOTHED and 0 < self._cost < np.inf:
-            text += f", {100 * (1 - cost / self._cost):.1f} % shorter"
-        self._cost = cost
+        text = f"{_label(stage)} path: cost {cost:.6g}, {waypoints} waypoints"
+        if stage is Stage.RAW:
+            self._raw_cost = cost
+        elif 0 < self._raw_cost < np.inf:
+            text += f", {100 * (1 - cost / self._raw_cost):.1f} % shorter"
         return text
 
-
-class _Tree:
-    """Where the nodes of a tree are, and which of its edges are drawn."""
-
-    def __init__(self, world: World) -> None:
-        self.nodes, self.drawn, self.thinned = 0, 0, False
-        self._places = np.full((1024, world.dim), np.nan, np.float32)
-        side = int(_CELLS ** (1 / world.dim))
-        self._lower, self._scale = world.lower, side / (world.upper - world.lower)
-        self._shape = (side,) * world.dim
-        self._taken = np.zeros(side**world.dim, np.bool_)
-
-    def join(self, rows: Table) -> tuple[Points, Indices]:
-        """Take in edges; return the lines to draw, shape (n, 2, dim), and which rows they are."""
-        places = _places(rows["q"], self._places.shape[1])
-        self._keep(rows["node"], places)
-        wanted = rows["parent"] >= 0
-        cells = self._cells_of(rows["q"])
-        late = np.arange(self.nodes, self.nodes + len(rows)) >= _DRAWN_IN_FULL
-        if late.any():
-            self.thinned = True
-            first_of_cell = np.zeros(len(rows), np.bool_)
-            first_of_cell[np.unique(cells, return_index=True)[1]] = True
-            wanted &= ~late | (first_of_cell & ~self._taken[cells])
-        self._taken[cells] = True
-        which = np.flatnonzero(wanted)
-        self.nodes, self.drawn = self.nodes + len(rows), self.drawn + len(which)
-        return np.stack([self.places(rows["parent"][which]), places[which]], axis=1), which
-
-    def places(self, nodes: NDArray[np.int32]) -> Points:
-        """Where nodes are, shape (n, dim); NaN, which is not drawn, where it was not kept."""
-        found = self._places[np.clip(nodes, 0, len(self._places) - 1)]
-        found[(nodes < 0) | (nodes >= len(self._places))] = np.nan
-        return found
-
-    def _keep(self, nodes: NDArray[np.int32], places: Points) -> None:
-        kept = (nodes >= 0) & (nodes < _KEPT_NODES)
-        nodes, places = nodes[kept], places[kept]
-        need = int(nodes.max(initial=-1)) + 1
-        if need > len(self._places):
-            grown = np.full((max(need, 2 * len(self._places)), places.shape[1]), np.nan, np.float32)
-            grown[: len(self._places)] = self._places
-            self._places = grown
-        self._places[nodes] = places
-
-    def _cells_of(self, q: NDArray[np.float64]) -> Indices:
-        dim = len(self._shape)
-        cells = ((q[:, :dim] - self._lower) * self._scale).astype(np.int64)
-        return np.ravel_multi_index(tuple(cells.T), self._shape, mode="clip")
+    def _tell_news(self) -> None:
+        if self._news:
+            self._news.sort(key=lambda item: int(item[0]["seq"]))
+            texts = rr.TextLog.columns(text=[text for _, text in self._news])
+            rows = _moments(event for event, _ in self._news)
+            self._rec.send_columns("/log", time_columns(rows), texts)
+            self._news.clear()
 
 
-def _places(values: Any, dim: int) -> Points:  # noqa: ANN401 - anything with numbers
-    """Positions of configurations, shape (n, dim): a robot's first coordinates are its place."""
-    return np.ascontiguousarray(np.asarray(values)[..., :dim], np.float32)
+def _even_rows(count: int) -> NDArray[np.int64]:
+    return np.append(np.arange(_FADING_ROW, count, _FADING_ROW), count)
 
 
 def _moments(events: Iterable[Any]) -> Table:
@@ -318,12 +244,12 @@ def _moments(events: Iterable[Any]) -> Table:
     return np.array([(e["seq"], e["t"], e["iteration"]) for e in events], _MOMENT)
 
 
-def _phase_text(event: Any) -> str:  # noqa: ANN401
+def _phase_text(event: Any) -> str:
     phase, status = Phase(int(event["name"])), Status(int(event["status"]))
     if status is Status.BEGIN:
         return f"{_label(phase)} begins"
     return f"{_label(phase)} ends: {_label(status).replace('_', ' ')}"
 
 
-def _label(choice: Phase | Status | Source | Reason) -> str:
+def _label(choice: Phase | Status | Source | Reason | Stage) -> str:
     return choice.name.lower()

@@ -5,20 +5,19 @@ import importlib.util
 import json
 import shutil
 import warnings
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
 
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Field, Kind, Table, table_dtype
+from brrt.events import FIELDS, Events, Kind, Table, table_dtype
+from brrt.recording.columns import TIMELINES, Checksums, from_arrow, split, time_columns, to_arrow
 from brrt.recording.drain import Drain
-from brrt.recording.drawing import Drawing, time_columns
+from brrt.recording.drawing import Drawing
 from brrt.recording.recording import Recording
 from brrt.recording.scene import blueprint, document
 from brrt.replay.metrics import Metrics
@@ -55,16 +54,16 @@ class RerunSink:
         rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
         self._manifest, self._view = manifest, view
         self._metrics, self._checksums = Metrics(manifest), Checksums()
-        layout = blueprint(manifest, world)
+        self._layout = blueprint(manifest, world)
         self._rec: Any = rr.RecordingStream(
             APPLICATION, recording_id=recording_id(manifest), send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._rec)
         if view:
-            _open_viewer()
+            _open_viewer(self._rec)
         self._drain = None if path is None else Drain(path)
         try:
-            self._connect(layout)
+            self._connect(blueprint(manifest, world, live=True) if view else self._layout)
             self._write_head(world)
             self._drawing = Drawing(self._rec, manifest, world)
             self._flush()
@@ -79,13 +78,13 @@ class RerunSink:
             RecordingError: The disk is full, or something else is wrong with the file.
         """
         for kind, table in events.tables.items():
-            entity = f"{_EVENTS}{kind.label}"
-            values = {field.name: _to_arrow(field, table[field.name]) for field in FIELDS[kind]}
-            columns = rr.DynamicArchetype.columns(_archetype(entity), components=values)
-            self._rec.send_columns(entity, time_columns(table), columns)
+            entity, columns = f"{_EVENTS}{kind.label}", split(table)
+            values = {field.name: to_arrow(field, columns[field.name]) for field in FIELDS[kind]}
+            components = rr.DynamicArchetype.columns(_archetype(entity), components=values)
+            self._rec.send_columns(entity, time_columns(columns), components)
+            self._checksums.write(kind, columns)
         self._drawing.write(events)
         self._metrics.write(events)
-        self._checksums.write(events)
         self._flush()
 
     def close(self, *, whole: bool) -> None:
@@ -103,11 +102,13 @@ class RerunSink:
                 end["result"] = json.dumps(figures)
                 self._document(document(self._manifest, figures))
             self._write_texts(_END, end)
+            if self._view:  # the file is to open at its beginning, though the viewer is at the end
+                self._rec.send_blueprint(self._layout, make_active=False)
             self._flush()
         finally:
             self._disconnect()
 
-    def _connect(self, layout: Any) -> None:  # noqa: ANN401 - a blueprint
+    def _connect(self, layout: Any) -> None:
         sinks: list[Any] = []
         if self._view:
             sinks.append(rr.GrpcSink(f"rerun+http://127.0.0.1:{_PORT}/proxy"))
@@ -139,8 +140,8 @@ class RerunSink:
         self._document(document(self._manifest))
 
     def _write_texts(self, entity: str, texts: dict[str, str]) -> None:
-        values = {name: pa.array([text]) for name, text in texts.items()}
-        self._rec.log(entity, rr.DynamicArchetype(_archetype(entity), components=values), static=True)
+        value = rr.DynamicArchetype(_archetype(entity), components=texts)
+        self._rec.log(entity, value, static=True)
 
     def _document(self, text: str) -> None:
         markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
@@ -164,63 +165,28 @@ def recording_id(manifest: Manifest) -> str:
     return f"{manifest.scenario.planner}-{digest[:16]}"
 
 
-def _open_viewer() -> None:
+def _open_viewer(rec: rr.RecordingStream) -> None:
     own = importlib.util.find_spec("rerun_cli")
     folder = None if own is None or own.origin is None else str(Path(own.origin).parent)
     # Rerun looks for its viewer on the PATH alone, where a venv that is not activated is missing.
     program = shutil.which("rerun", path=folder) or shutil.which("rerun")
     try:
-        rr.spawn(port=_PORT, connect=False, hide_welcome_screen=True, executable_path=program)
+        # Without a recording that is enabled, `spawn` does nothing.
+        rr.spawn(
+            port=_PORT,
+            connect=False,
+            hide_welcome_screen=True,
+            executable_path=program,
+            recording=rec,
+        )
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[0]
         raise RecordingError(f"cannot open the Rerun viewer: {reason}") from None
 
 
-class Checksums:
-    """CRC-32 of each column of the events, however they are cut into batches.
-
-    Rerun's format has no checksums: of 300 flipped bits, 201 went by without an error.
-    """
-
-    def __init__(self) -> None:
-        self._sums: dict[str, int] = {}
-
-    def add(self, name: str, data: Any) -> None:  # noqa: ANN401 - bytes, or an array
-        """Take in the next bytes of a column."""
-        self._sums[name] = zlib.crc32(data, self._sums.get(name, 0))
-
-    def write(self, events: Events) -> None:
-        """Take in a batch."""
-        for kind, table in events.tables.items():
-            for column in table.dtype.names or ():
-                name = f"{kind.label}.{column}"
-                if table.dtype[column] == object:
-                    for row in table[column]:
-                        self.add(f"{name} sizes", row.size.to_bytes(8, "little"))
-                        self.add(name, np.ascontiguousarray(row))
-                else:
-                    self.add(name, np.ascontiguousarray(table[column]))
-
-    def to_json(self) -> str:
-        """Return the sums as text."""
-        return json.dumps(self._sums, sort_keys=True)
-
-
 def _archetype(entity: str) -> str:
     """`brrt.edge` for `/ev/edge`."""
     return f"brrt.{entity.rsplit('/', 1)[-1]}"
-
-
-def _to_arrow(field: Field, values: Any) -> Any:  # noqa: ANN401 - numpy to pyarrow
-    """One value a row, of a field of any type."""
-    if field.type == "q[]":
-        flat = [np.ravel(row) for row in values]
-        offsets = np.cumsum([0, *map(len, flat)], dtype=np.int32)
-        return pa.ListArray.from_arrays(offsets, pa.array(np.concatenate(flat), pa.float64()))
-    values = np.ascontiguousarray(values)
-    if field.type == "q":
-        return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
-    return pa.array(values)
 
 
 def read_rerun(path: Path) -> Recording:
@@ -232,27 +198,14 @@ def read_rerun(path: Path) -> Recording:
         RecordingError: The file cannot be read, is cut or damaged, or is no recording of brrt.
     """
     chunks = _load(path)
+    if _MANIFEST not in chunks:
+        raise RecordingError(f"{path}: a Rerun file, but not a recording of brrt (no {_MANIFEST})")
     try:
-        texts = {entity: _text(chunks, entity, "json") for entity in (_MANIFEST, _WORLD)}
-        if None in texts.values():
-            raise BrrtError("a Rerun file, but not a recording of brrt (no /brrt/manifest in it)")
-        manifest = Manifest.from_strings(json.loads(str(texts[_MANIFEST])))
-        world = World.from_json(str(texts[_WORLD]))
-        events = _events(chunks, manifest.dof)
-        expected, result = (_text(chunks, _END, name) for name in ("checksums", "result"))
-        if expected is not None:
-            sums = Checksums()
-            for entity, text in texts.items():
-                sums.add(entity, str(text).encode())
-            sums.write(events)
-            if sums.to_json() != expected:
-                raise BrrtError("damaged: the checksums do not match")
-        figures = None if result is None else json.loads(result)
+        return _recording(chunks)
     except BrrtError as error:
         raise RecordingError(f"{path}: {error}") from None
-    except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
+    except Exception as error:  # noqa: BLE001 - whatever damaged data lead to
         raise RecordingError(f"{path}: damaged: {error!r}") from None
-    return Recording(manifest, world, lambda: _batches(events), figures)
 
 
 def _load(path: Path) -> dict[str, list[Any]]:
@@ -279,6 +232,24 @@ def _load(path: Path) -> dict[str, list[Any]]:
             f"`rerun rrd merge {path} -o whole.rrd` saves what is whole"
         ) from None
     return found
+
+
+def _recording(chunks: dict[str, list[Any]]) -> Recording:
+    texts = {entity: _text(chunks, entity, "json") or "" for entity in (_MANIFEST, _WORLD)}
+    manifest = Manifest.from_strings(json.loads(texts[_MANIFEST]))
+    world = World.from_json(texts[_WORLD])
+    events = _events(chunks, manifest.dof)
+    expected, result = (_text(chunks, _END, name) for name in ("checksums", "result"))
+    if expected is not None:
+        sums = Checksums()
+        for entity, text in texts.items():
+            sums.add(entity, text.encode())
+        for kind, table in events.tables.items():
+            sums.write(kind, split(table))
+        if sums.to_json() != expected:
+            raise BrrtError("damaged: the checksums do not match")
+    figures = None if result is None else json.loads(result)
+    return Recording(manifest, world, lambda: _batches(events), figures)
 
 
 def _text(chunks: dict[str, list[Any]], entity: str, name: str) -> str | None:
@@ -310,30 +281,14 @@ def _table(kind: Kind, dof: int, batches: list[Any]) -> Table:
     for batch in batches:
         begin, end = end, end + batch.num_rows
         part = table[begin:end]
-        for name, timeline in (("seq", "event"), ("t", "t"), ("iteration", "iteration")):
-            part[name] = batch.column(timeline).cast(pa.int64()).to_numpy()
+        for timeline, name in TIMELINES.items():
+            part[name] = batch.column(timeline).cast("int64").to_numpy()
         for field in FIELDS[kind]:
             column = batch.column(f"brrt.{kind.label}:{field.name}")
-            part[field.name] = _from_arrow(field, column, dof)
+            part[field.name] = from_arrow(field, column, dof)
     if (np.diff(table["seq"]) <= 0).any():
         table = table[np.argsort(table["seq"], kind="stable")]
     return table
-
-
-def _from_arrow(field: Field, column: Any, dof: int) -> Any:  # noqa: ANN401 - pyarrow to numpy
-    """Undo `_to_arrow`; Rerun has wrapped each value into a list of its own."""
-    flat = column.flatten()
-    if field.type == "q[]":
-        sizes = np.asarray(column.value_lengths())
-        rows = np.empty(len(sizes), object)
-        for i, row in enumerate(np.split(flat.to_numpy(), np.cumsum(sizes)[:-1])):
-            rows[i] = row.reshape(-1, dof)
-        return rows
-    if len(flat) != len(column):
-        raise ValueError(f"{field.name} has {len(flat)} values in {len(column)} rows")
-    if field.type == "q":
-        return flat.flatten().to_numpy().reshape(-1, dof)
-    return flat.to_numpy(zero_copy_only=False)
 
 
 def _batches(events: Events) -> Iterator[Events]:

@@ -21,46 +21,51 @@ OBSTACLE_3D = (112, 120, 137)
 OUTLINE: Colour = (96, 103, 118)
 START: Colour = (255, 145, 30)
 GOAL: Colour = (60, 215, 100)
-TREES: Mapping[int, tuple[str, Colour]] = {
-    0: ("start", (74, 144, 255)),
-    1: ("goal", (255, 82, 82)),
-}
-"""Names and colours of the trees that planners grow."""
-PATHS: Mapping[Stage, tuple[str, Colour, float]] = {
-    Stage.RAW: ("raw", (255, 240, 100), 1.5),
-    Stage.SMOOTHED: ("smoothed", (255, 184, 0), 3.0),
-}
-"""Names, colours and radii of the paths, in points of the screen."""
+OTHER: Colour = (180, 120, 255)
+"""For what has no colour of its own here."""
 SAMPLES: Mapping[Source, Colour] = {Source.UNIFORM: (135, 143, 158), Source.GOAL: GOAL}
 REJECTS: Mapping[Reason, Colour] = {
     Reason.COLLISION: (150, 74, 80),
     Reason.NO_PROGRESS: (120, 110, 90),
     Reason.GOAL_BLOCKED: (140, 90, 150),
 }
-_OTHER: Colour = (180, 120, 255)
-
+_TREES: Mapping[int, tuple[str, Colour]] = {
+    0: ("start", (74, 144, 255)),
+    1: ("goal", (255, 82, 82)),
+}
+_PATHS: Mapping[Stage, tuple[Colour, float]] = {
+    Stage.RAW: ((255, 240, 100), 1.5),
+    Stage.SMOOTHED: ((255, 184, 0), 3.0),
+}
 FADING_ITERATIONS, FADING_EVENTS, FADING_SECONDS = 300, 1000, 0.001
 """How long samples and rejections stay in sight on each timeline."""
 
-_LAYERS, _OVERLAP = 8, 1.5
+_LAYERS, _OVERLAP = 5, 1.5
+"""Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
+covers the missing corner of the next."""
 
 
 def is_flat(manifest: Manifest) -> bool:
     """Whether the picture is drawn in 2D."""
-    return manifest.dim == 2  # noqa: PLR2004
+    return manifest.dim == 2
 
 
-def tree_entity(number: int) -> str:
-    """Where a tree is drawn."""
-    return f"/world/tree/{TREES[number][0] if number in TREES else number}"
+def tree_style(number: int) -> tuple[str, Colour]:
+    """Return a tree's name and colour."""
+    return _TREES.get(number, (str(number), OTHER))
 
 
-def tree_colour(number: int) -> Colour:
-    """Return the colour of a tree."""
-    return TREES[number][1] if number in TREES else _OTHER
+def path_style(stage: Stage) -> tuple[str, Colour, float]:
+    """Return a path's name, its colour, and its lines' radius in points of the screen."""
+    return (stage.name.lower(), *_PATHS.get(stage, (OTHER, 2.0)))
 
 
-def log_scene(rec: Any, manifest: Manifest, world: World) -> None:  # noqa: ANN401
+def places(values: Any, dim: int) -> NDArray[np.float32]:
+    """Where configurations are, shape (n, dim): the first coordinates of a robot are its place."""
+    return np.ascontiguousarray(np.asarray(values)[..., :dim], np.float32)
+
+
+def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
     """Draw obstacles, bounds, start and goal."""
     if is_flat(manifest):
         # Rerun's 2D views have y pointing down; maps have it pointing up.
@@ -68,14 +73,24 @@ def log_scene(rec: Any, manifest: Manifest, world: World) -> None:  # noqa: ANN4
     still = _still_2d(world) if is_flat(manifest) else _still_3d(world)
     for entity, archetype in still.items():
         rec.log(entity, archetype, static=True)
-    for name, q, colour in (("start", manifest.start, START), ("goal", manifest.goal, GOAL)):
-        look: dict[str, Any] = {"colors": colour, "radii": -7, "labels": name, "show_labels": True}
-        place = np.array([q[: manifest.dim]])
-        if is_flat(manifest):
-            mark = rr.LineStrips2D(_discs(place, 1e-6 * world.extent), draw_order=100, **look)
-        else:
-            mark = rr.Points3D(place, **look)
-        rec.log(f"/world/{name}", mark, static=True)
+    marks = (("start", manifest.start, START), ("goal", manifest.goal, GOAL))
+    for name, q, colour in marks:
+        place = places([q], manifest.dim)
+        rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
+        # Rerun writes a label across its point; this one stands below.
+        place[0, -1] -= 0.012 * world.extent
+        rec.log(f"/world/{name}/label", _label(place, colour, name), static=True)
+
+
+def _mark(place: NDArray[np.float32], colour: Colour, extent: float) -> Any:
+    if place.shape[1] == 2:
+        return rr.LineStrips2D(_discs(place, 1e-6 * extent), colors=colour, radii=-7, draw_order=100)
+    return rr.Points3D(place, colors=colour, radii=-7)
+
+
+def _label(place: NDArray[np.float32], colour: Colour, text: str) -> Any:
+    points: Any = rr.Points2D if place.shape[1] == 2 else rr.Points3D
+    return points(place, colors=colour, radii=0, labels=text, show_labels=True)
 
 
 def _still_2d(world: World) -> dict[str, Any]:
@@ -96,22 +111,24 @@ def _still_2d(world: World) -> dict[str, Any]:
     return still
 
 
-def _discs(centres: NDArray[np.float64], nowhere: Any) -> NDArray[np.float32]:  # noqa: ANN401
-    """Lines that hardly go anywhere: their round ends make a disc, and points have shading."""
-    return np.stack([centres, centres + nowhere * np.array([1.0, 0.0])], axis=1).astype(np.float32)
+def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:
+    """Lines that hardly go anywhere: their round ends make a disc, where points have shading."""
+    ends = centres + length
+    centres = centres.astype(np.float32)
+    ends = np.maximum(ends.astype(np.float32), np.nextafter(centres, np.float32(np.inf)))
+    return np.stack([centres, ends], axis=1)
 
 
-def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> Any:  # noqa: ANN401
-    """Boxes of thick lines nested in each other: Rerun has no filled shapes in 2D."""
+def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.Boxes2D:
+    """Boxes of thick lines nested in each other, and an edge: Rerun fills no shapes in 2D."""
     centre, half = (lower + upper) / 2, (upper - lower) / 2
-    layers = int(np.clip(32_000 // len(half), 2, _LAYERS))
-    radius = half.min(axis=1) / (1 + _OVERLAP * (layers - 1))
-    inset = (1 + _OVERLAP * np.arange(layers)[:, None]) * radius
+    radius = half.min(axis=1) / (1 + _OVERLAP * (_LAYERS - 1))
+    inset = (1 + _OVERLAP * np.arange(_LAYERS)[:, None]) * radius
     nested = np.maximum(half - inset[..., None], 0).reshape(-1, 2)
     return rr.Boxes2D(
-        centers=np.tile(centre, (layers, 1)),
-        half_sizes=nested,
-        radii=np.tile(radius, layers),
+        centers=np.tile(centre, (_LAYERS + 1, 1)),
+        half_sizes=np.concatenate([nested, half]),
+        radii=np.concatenate([np.tile(radius, _LAYERS), np.full(len(half), -0.5)]),
         colors=OBSTACLE,
         draw_order=0,
     )
@@ -185,9 +202,19 @@ def _numbers(values: tuple[float, ...]) -> str:
     return ", ".join(f"{value:g}" for value in values)
 
 
-def blueprint(manifest: Manifest, world: World) -> Any:  # noqa: ANN401 - a rerun Blueprint
-    """Lay out the world, the plots, the log and the manifest, with the time at the start."""
-    axis = rrb.TimeAxis(view_range=rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()))
+def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Blueprint:
+    """Lay out the world, the plots, the log and the manifest.
+
+    Args:
+        manifest: The run's.
+        world: The run's.
+        live: Follow what comes, instead of waiting at the start.
+    """
+    axis = rrb.TimeAxis(
+        view_range=rr.TimeRange(
+            start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
+        )
+    )
     plots = [
         rrb.TimeSeriesView(origin=f"/series/{entity}", name=name, axis_x=axis)
         for entity, name in (
@@ -205,20 +232,25 @@ def blueprint(manifest: Manifest, world: World) -> Any:  # noqa: ANN401 - a reru
     right = rrb.Vertical(*plots, log, run, row_shares=[3, 3, 3, 4, 5])
     return rrb.Blueprint(
         rrb.Horizontal(_world_view(manifest, world), right, column_shares=[5, 2]),
-        rrb.TimePanel(state="collapsed", timeline="iteration", play_state="paused", fps=100),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline="iteration",
+            play_state="following" if live else "paused",
+            fps=100,
+        ),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
 
 
-def _world_view(manifest: Manifest, world: World) -> Any:  # noqa: ANN401
+def _world_view(manifest: Manifest, world: World) -> Any:
     past = [(name, rrb.TimeRangeBoundary.infinite()) for name in ("iteration", "event", "t")]
     recent = [
         ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS)),
         ("event", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_EVENTS)),
         ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS)),
     ]
-    shown = {tree_entity(number): past for number in TREES}
+    shown = {f"/world/tree/{name}": past for name, _ in _TREES.values()}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
     options: dict[str, Any] = {
@@ -244,7 +276,7 @@ def _world_view(manifest: Manifest, world: World) -> Any:  # noqa: ANN401
     return rrb.Spatial3DView(eye_controls=eye, line_grid=False, **options)
 
 
-def _ranges(starts: list[tuple[str, Any]]) -> Any:  # noqa: ANN401
+def _ranges(starts: list[tuple[str, Any]]) -> Any:
     now = rrb.TimeRangeBoundary.cursor_relative()
     return rrb.VisibleTimeRanges(
         [rrb.VisibleTimeRange(timeline, start=start, end=now) for timeline, start in starts]

@@ -46,13 +46,11 @@ class PointSpace(NamedTuple):
 
     @staticmethod
     @inlined
-    def box_measure(
-        space: "PointSpace", low: Floats, high: Floats, b: int, Q: Floats, i: int
-    ) -> float:
+    def box_measure(space: "PointSpace", boxes: Floats, b: int, Q: Floats, i: int) -> float:
         """Square of the distance to a box."""
-        total = 0.0
-        for k in range(len(space.lower)):
-            outside = max(0.0, low[b, k] - Q[i, k], Q[i, k] - high[b, k])
+        d, total = len(space.lower), 0.0
+        for k in range(d):
+            outside = max(0.0, boxes[b, k] - Q[i, k], Q[i, k] - boxes[b, d + k])
             total += outside * outside
         return total
 

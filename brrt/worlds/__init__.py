@@ -55,6 +55,8 @@ def make_world(
         settings = GENERATORS[name].parse(f"world {name}", _pairs(spec, rest))
         return settings.make(spec, start, goal)
     path = Path(spec)
+    if not spec:
+        raise unknown("world", spec, GENERATORS)
     if path.suffix in LOADERS or path.exists():
         return load_world(path)
     if "/" in spec or path.suffix:
@@ -74,7 +76,7 @@ def load_world(path: Path) -> World:
         size = path.stat().st_size
         if size > _MAX_BYTES:
             raise BrrtError(f"{path}: {size:,} bytes are too many; a world has {_MAX_BYTES:,}")
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise BrrtError(f"{path}: {error.strerror or error}") from None
     except UnicodeDecodeError:

@@ -13,17 +13,38 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 
 SCHEMA, VERSION = "brrt.world", 1
+_GREATEST = 1e100
+"""Kernels square coordinates; beyond this they could not decide."""
 Floats = NDArray[np.float64]
 
 
-def _rows(name: str, values: Any, width: int) -> Floats:
+def _numbers_of(name: str, values: Any, what: str) -> Floats:
+    """Read numbers from JSON or from a user; none may be so large that its square overflows."""
     try:
         array = np.array(values, dtype=np.float64)
-        array = array.reshape(-1, width) if array.size else np.empty((0, width))
-    except (TypeError, ValueError):
-        raise BrrtError(f"world: {name} must be rows of {width} numbers") from None
+    except (TypeError, ValueError, OverflowError):
+        raise BrrtError(f"world: {name} must be {what}") from None
     if not np.isfinite(array).all():
         raise BrrtError(f"world: {name} must hold finite numbers only")
+    if (np.abs(array) > _GREATEST).any():
+        raise BrrtError(f"world: {name} must hold numbers up to {_GREATEST:g} only")
+    return array
+
+
+def _point(name: str, values: Any) -> Floats:
+    array = _numbers_of(name, values, "a row of numbers")
+    if array.ndim != 1:
+        raise BrrtError(f"world: {name} must be a row of numbers")
+    return array
+
+
+def _rows(name: str, values: Any, width: int) -> Floats:
+    what = f"rows of {width} numbers"
+    array = _numbers_of(name, values, what)
+    if array.size == 0:
+        return np.empty((0, width))
+    if array.ndim != 2 or array.shape[1] != width:
+        raise BrrtError(f"world: {name} must be {what}")
     return array
 
 
@@ -54,16 +75,17 @@ class World:
 
     def __post_init__(self) -> None:
         """Bring the arrays to float64 and check them."""
-        dim = int(np.size(self.lower))
-        if dim not in (2, 3) or np.size(self.upper) != dim:
+        for name in ("lower", "upper", "start", "goal"):
+            if getattr(self, name) is not None or name in ("lower", "upper"):
+                object.__setattr__(self, name, _point(name, getattr(self, name)))
+        dim = len(self.lower)
+        if dim not in (2, 3) or len(self.upper) != dim:
             raise BrrtError(f"world: bounds must have 2 or 3 coordinates, not {dim}")
-        widths = {"lower": dim, "upper": dim, "balls": dim + 1, "boxes": 2 * dim}
-        for name, width in widths.items():
-            rows = _rows(name, getattr(self, name), width)
-            object.__setattr__(self, name, rows[0] if name in ("lower", "upper") else rows)
-        for name in ("start", "goal"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _rows(name, getattr(self, name), dim)[0])
+        for name, end in (("start", self.start), ("goal", self.goal)):
+            if end is not None and len(end) != dim:
+                raise BrrtError(f"world: {name} must be {dim} numbers, not {len(end)}")
+        for name, width in (("balls", dim + 1), ("boxes", 2 * dim)):
+            object.__setattr__(self, name, _rows(name, getattr(self, name), width))
         if not (self.lower < self.upper).all():
             raise BrrtError("world: each upper bound must be above its lower bound")
         if (self.boxes[:, :dim] > self.boxes[:, dim:]).any():

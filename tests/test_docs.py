@@ -1,0 +1,62 @@
+"""What the documents tell people to type works."""
+
+import importlib.util
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from .conftest import Result
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    """Return the fenced blocks in a language, but the one that sets everything up."""
+    found: list[str] = re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+    return [block for block in found if "venv" not in block]
+
+
+def test_readme_commands_and_code(
+    brrt: Callable[..., Result], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Every brrt command and every Python block of the README runs, in its order."""
+    (scenario,) = blocks("toml")
+    Path("experiment.toml").write_text(scenario)
+    commands = [
+        shlex.split(line, comments=True)[1:]
+        for block in blocks("sh")
+        for line in block.splitlines()
+        if line.startswith("brrt ")
+    ]
+    assert len(commands) >= 5
+    for args in commands:
+        Path("run.mcap" if "--out" not in args and args[0] == "plan" else "none").unlink(True)
+        Path("run.rrd" if "--out" not in args and args[0] == "plan" else "none").unlink(True)
+        done = brrt(*args)
+        # The two seeds of the tour are of one world: that the runs part is its point.
+        assert done.code == (1 if "--check" in args else 0), (args, done.err)
+    for code in blocks("python"):
+        exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own text
+        assert capfd.readouterr().out
+
+
+def test_events_page_is_up_to_date() -> None:
+    """The page says what the declaration says."""
+    spec = importlib.util.spec_from_file_location("make_events", ROOT / "docs" / "make_events.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.PAGE.read_text() == module.page()
+
+
+def test_documents_name_no_file_that_is_missing() -> None:
+    """Every relative link of the README leads somewhere."""
+    links = re.findall(r"\]\(([^)#]+)\)", README)
+    for link in links:
+        if "://" not in link:
+            assert (ROOT / link).exists(), link

@@ -1,0 +1,449 @@
+"""Rerun recordings: exact, readable by stock tools, drawn in time, and honest about damage."""
+
+import json
+import os
+import resource
+import shutil
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+import rerun_cli
+from hypothesis import given
+from hypothesis import strategies as st
+from rerun.chunk import RrdReader
+
+from brrt import Events, Kind, RecordingError, Run, Scenario, read
+from brrt.events import FIELDS, Stage, table_dtype
+from brrt.recording import Memory, drawing, rerun, scene, tree_sketch
+from brrt.recording.rerun import RerunSink, read_rerun, recording_id
+
+SCENARIOS = {
+    "2d": Scenario(world="circles2d:n=30", seed=7, clock="logical", params={"step": 2.0}),
+    "3d": Scenario(world="boxes3d:n=60", seed=1),
+    "unsolved": Scenario(world="spheres3d:n=9", iterations=40),
+}
+PROGRAM = Path(str(rerun_cli.__file__)).with_name("rerun")
+
+
+def write(path: Path, scenario: Scenario, *, batch: int = 50) -> tuple[Run, Events]:
+    """Record a run with small batches; return it with its log."""
+    run, memory = Run(scenario, batch=batch), Memory()
+    run.execute([RerunSink(run.manifest, run.problem.world, path=path), memory])
+    return run, memory.events()
+
+
+def same(a: Events, b: Events) -> bool:
+    """Whether two logs are equal in every bit, their types included."""
+    if a.tables.keys() != b.tables.keys():
+        return False
+    for kind, table in a.tables.items():
+        if table.dtype != b[kind].dtype or len(table) != len(b[kind]):
+            return False
+        for name in table.dtype.names or ():
+            for x, y in zip(table[name], b[kind][name], strict=True):
+                if np.shape(x) != np.shape(y) or x.tobytes() != y.tobytes():
+                    return False
+    return True
+
+
+def chunks(path: Path, entity: str) -> list[Any]:
+    """The record batches of an entity, the still ones left out."""
+    stream = RrdReader(path).stream()
+    return [
+        chunk.to_record_batch()
+        for chunk in stream
+        if chunk.entity_path == entity and not chunk.is_static
+    ]
+
+
+def column(path: Path, entity: str, ending: str) -> list[Any]:
+    """The values of a component, one list a row."""
+    rows = []
+    for batch in chunks(path, entity):
+        (name,) = (name for name in batch.schema.names if name.endswith(ending))
+        rows += batch.column(name).to_pylist()
+    return rows
+
+
+def log_lines(path: Path) -> list[str]:
+    """The text log."""
+    return [text for (text,) in column(path, "/log", ":text")]
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_round_trip(name: str, tmp_path: Path) -> None:
+    """What is read is what was written, to the last bit and the last nanosecond."""
+    path = tmp_path / "run.rrd"
+    run, log = write(path, SCENARIOS[name])
+    recording = read(path)
+    assert same(recording.events(), log)
+    assert recording.manifest == run.manifest
+    assert recording.world.to_json() == run.problem.world.to_json()
+    assert recording.result == recording.metrics().as_dict()
+
+
+def test_batches_come_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each batch goes on where the one before ended, and the batches can be had again."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["2d"])
+    monkeypatch.setattr(rerun, "_BATCH", 70)
+    recording = read_rerun(path)
+    for _ in range(2):
+        seq = 0
+        for batch in recording.batches():
+            first, kinds = batch.kinds_in_order()
+            assert first == seq
+            assert len(kinds) <= 70
+            seq += len(kinds)
+        assert seq == len(log)
+
+
+def test_batch_size_does_not_matter(tmp_path: Path) -> None:
+    """However the run was cut into batches, the same log comes back."""
+    logs = []
+    for batch in (16, 100_000):
+        write(tmp_path / f"{batch}.rrd", SCENARIOS["2d"], batch=batch)
+        logs.append(read(tmp_path / f"{batch}.rrd").events())
+    assert same(*logs)
+
+
+def test_stock_reader_finds_every_field(tmp_path: Path) -> None:
+    """Rerun's own reader lists each kind with its fields under their names, on all timelines."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["3d"])
+    reader = RrdReader(path)
+    assert [store.application_id for store in reader.recordings()] == ["brrt"]
+    assert len(reader.blueprints()) == 1
+    for kind, table in log.tables.items():
+        entity = f"/ev/{kind.label}"
+        batches = chunks(path, entity)
+        assert sum(batch.num_rows for batch in batches) == len(table)
+        names = {f"brrt.{kind.label}:{field.name}" for field in FIELDS[kind]}
+        assert names | {"iteration", "event", "t"} <= set(batches[0].schema.names)
+
+
+def test_stock_command_reads_it(tmp_path: Path) -> None:
+    """`rerun rrd stats` reads the whole file."""
+    write(tmp_path / "run.rrd", SCENARIOS["2d"])
+    assert "/ev/edge" in rerun_command(tmp_path, "rrd", "stats", "run.rrd")
+
+
+def rerun_command(folder: Path, *args: str) -> str:
+    """Run Rerun's own program; a new home each time keeps it from sending anything anywhere."""
+    done = subprocess.run(
+        [str(PROGRAM), *args],
+        cwd=folder,
+        env={**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    return done.stdout
+
+
+def test_each_edge_is_drawn_in_its_time(tmp_path: Path) -> None:
+    """Up to any moment the picture has the edges up to then, but for a last row of 2 % or so."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["2d"])
+    edges = log[Kind.EDGE]
+    drawn, when = [], []
+    for batch in chunks(path, "/world/tree/start"):
+        (strips,) = (name for name in batch.schema.names if name.endswith(":strips"))
+        drawn += [len(row) for row in batch.column(strips).to_pylist()]
+        when += batch.column("event").to_pylist()
+    total = np.cumsum(drawn)
+    assert total[-1] == len(edges) - 1
+    for row, seq in enumerate(when):
+        assert total[row] == np.searchsorted(edges["seq"], seq, "right") - 1
+    assert max(drawn) <= 2 + len(edges) // 50
+
+
+def test_edges_are_drawn_from_their_parents(tmp_path: Path) -> None:
+    """Each line leads from the parent's place to the node's."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["3d"])
+    edges = log[Kind.EDGE]
+    strips = np.concatenate([np.array(row) for row in column(path, "/world/tree/start", ":strips")])
+    wanted = np.stack([edges["q"][edges["parent"][1:]], edges["q"][1:]], axis=1)
+    assert np.array_equal(strips, wanted.astype(np.float32))
+
+
+def test_path_shrinks_to_the_smoothed_one(tmp_path: Path) -> None:
+    """The path is drawn after each accepted shortcut, and in the end as the smoother left it."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["2d"])
+    raw, smoothed = log[Kind.PATH]
+    rows = column(path, "/world/path/smoothed", ":strips")
+    assert len(rows) == log[Kind.SHORTCUT]["accepted"].sum() + 1
+    sizes = [len(strip) for (strip,) in rows]
+    assert sizes == sorted(sizes, reverse=True)
+    assert np.array_equal(rows[-1][0], smoothed["waypoints"].astype(np.float32))
+    assert rows[-2] == rows[-1]
+    ((drawn,),) = column(path, "/world/path/raw", ":strips")
+    assert np.array_equal(drawn, raw["waypoints"].astype(np.float32))
+
+
+def test_log_tells_what_matters(tmp_path: Path) -> None:
+    """The text log has phases and paths, in order."""
+    path = tmp_path / "run.rrd"
+    write(path, SCENARIOS["2d"])
+    begins, raw, ends, smooth, smoothed, done = log_lines(path)
+    assert (begins, ends) == ("plan begins", "plan ends: solved")
+    assert (smooth, done) == ("smooth begins", "smooth ends: done")
+    assert raw.startswith("raw path: cost ")
+    assert smoothed.startswith("smoothed path: cost ")
+    assert smoothed.endswith(" % shorter")
+
+
+def test_long_runs_are_thinned_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond the limits less is drawn, the log says so, and the events stay exact."""
+    monkeypatch.setattr(drawing, "DRAWN_IN_FULL", 100)
+    monkeypatch.setattr(tree_sketch, "DRAWN_IN_FULL", 100)
+    monkeypatch.setattr(tree_sketch, "_CELLS", 64)
+    monkeypatch.setattr(tree_sketch, "_KEPT_NODES", 300)
+    monkeypatch.setattr(drawing, "_FADING_IN_FULL", 50)
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["2d"])
+    drawn = sum(map(len, column(path, "/world/tree/start", ":strips")))
+    assert 100 <= drawn <= 100 + 64 < len(log[Kind.EDGE])
+    points = sum(map(len, column(path, "/world/samples/uniform", ":positions")))
+    assert 50 <= points < len(log[Kind.SAMPLE]) / 2
+    lines = log_lines(path)
+    for text in ("start tree: beyond 100 nodes", "uniform samples: beyond 50", "collision rej"):
+        assert sum(line.startswith(text) for line in lines) == 1
+    assert same(read(path).events(), log)
+
+
+def test_trees_have_names_and_colours(tmp_path: Path) -> None:
+    """The start's tree is blue, the goal's red, a further one has a colour too."""
+    run = Run(SCENARIOS["2d"])
+    edges = np.zeros(6, table_dtype(Kind.EDGE, 2))
+    edges["seq"] = np.arange(6)
+    edges["tree"] = [0, 1, 2, 0, 1, 2]
+    edges["node"] = [0, 0, 0, 1, 1, 1]
+    edges["parent"] = [-1, -1, -1, 0, 0, 0]
+    path = tmp_path / "run.rrd"
+    sink = RerunSink(run.manifest, run.problem.world, path=path)
+    sink.write(Events(2, {Kind.EDGE: edges}))
+    sink.close(whole=True)
+    assert [len(column(path, f"/world/tree/{name}", ":strips")) for name in ("start", "goal", "2")] == [
+        1,
+        1,
+        1,
+    ]
+    (_, blue), (_, red) = scene.tree_style(0), scene.tree_style(1)
+    assert blue[2] == max(blue)
+    assert red[0] == max(red)
+    assert scene.path_style(Stage.RAW) != scene.path_style(Stage.SMOOTHED)
+
+
+@given(first=st.integers(0, 200_000), counts=st.lists(st.integers(1, 5000), min_size=1))
+def test_rows_grow_with_what_there_is(first: int, counts: list[int]) -> None:
+    """Rows cover everything once, and are no longer than about 1 % of it."""
+    for count in counts:
+        ends = drawing.growing_rows(first, count)
+        sizes = np.diff(ends, prepend=0)
+        assert ends[-1] == count
+        assert sizes.min() >= 1
+        assert sizes.max() <= min(1024, 2 + (first + count) / 50)
+        first += count
+
+
+def test_name_of_a_recording() -> None:
+    """Runs that are equal have one, others another."""
+    a, b = (Run(SCENARIOS["2d"]).manifest for _ in range(2))
+    other = Run(Scenario(world="circles2d:n=30", seed=8, clock="logical")).manifest
+    assert recording_id(a) == recording_id(b) != recording_id(other)
+
+
+def test_run_that_did_not_end(tmp_path: Path) -> None:
+    """Its events are all there; the figures are not."""
+    run = Run(SCENARIOS["2d"], batch=50)
+    sink = RerunSink(run.manifest, run.problem.world, path=tmp_path / "run.rrd")
+    events = run.events()
+    batches = [next(events) for _ in range(3)]
+    for batch in batches:
+        sink.write(batch)
+    sink.close(whole=False)
+    sink.close(whole=False)
+    recording = read(tmp_path / "run.rrd")
+    assert recording.result is None
+    assert same(recording.events(), Events.concat(2, batches))
+
+
+def test_cut_file(tmp_path: Path) -> None:
+    """A cut file is an error that names the remedy, and the remedy saves what was whole."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["2d"])
+    data = path.read_bytes()
+    (tmp_path / "cut.rrd").write_bytes(data[: len(data) * 2 // 5])
+    with pytest.raises(RecordingError, match=r"cut\.rrd: cut or damaged .*`rerun rrd merge ") as told:
+        read(tmp_path / "cut.rrd")
+    assert "\n" not in str(told.value)
+    rerun_command(tmp_path, "rrd", "merge", "cut.rrd", "-o", "whole.rrd")
+    saved = read(tmp_path / "whole.rrd")
+    events = saved.events()
+    assert saved.result is None
+    assert 0 < len(events) < len(log)
+    assert same(events, log.until(seq=len(events) - 1))
+
+
+def test_cut_anywhere(tmp_path: Path) -> None:
+    """Wherever a file is cut, it is an error or a shorter log, never a wrong one."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["unsolved"])
+    data = path.read_bytes()
+    for length in [0, 3, 4, 12, 50, *range(100, len(data), len(data) // 40), len(data) - 1]:
+        path.write_bytes(data[:length])
+        check_damaged(path, log)
+
+
+def test_flipped_bits(tmp_path: Path) -> None:
+    """Any flipped bit is found, unless it sits in the picture alone."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["unsolved"], batch=16384)
+    data = path.read_bytes()
+    rng = np.random.default_rng(0)
+    found = 0
+    for _ in range(150):
+        damaged = bytearray(data)
+        damaged[rng.integers(len(data))] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        found += check_damaged(path, log)
+    assert found > 10
+
+
+def check_damaged(path: Path, log: Events) -> bool:
+    """Assert that a file tells the truth or raises; return whether it raised."""
+    try:
+        recording = read_rerun(path)
+    except RecordingError as error:
+        assert str(error).startswith(str(path))
+        assert "\n" not in str(error)
+        return True
+    events = recording.events() if any(True for _ in recording.batches()) else None
+    if recording.result is not None:
+        assert events is not None
+        assert same(events, log)
+    elif events is not None:
+        assert same(events, log.until(seq=len(events) - 1))
+    return False
+
+
+def test_flipped_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A number that changed on the way is found by the checksums."""
+    path = tmp_path / "run.rrd"
+    write(path, SCENARIOS["unsolved"])
+    load = rerun._load
+
+    def changed(path: Path) -> dict[str, list[Any]]:
+        found = load(path)
+        found["/ev/sample"] = [b.set_column(0, b.schema.field(0), b.column(0)) for b in found["/ev/sample"]]
+        found["/ev/edge"] = found["/ev/edge"][:-1]
+        return found
+
+    monkeypatch.setattr(rerun, "_load", changed)
+    with pytest.raises(RecordingError, match="the checksums do not match"):
+        read_rerun(path)
+
+
+def test_foreign_files(tmp_path: Path) -> None:
+    """Files of others are told from ours, each in one line that names the file."""
+    path = tmp_path / "foreign.rrd"
+    with rr.RecordingStream("other") as rec:
+        rec.save(path)
+        rec.log("text", rr.TextLog("hello"))
+        rec.disconnect()
+    with pytest.raises(RecordingError, match=r"foreign\.rrd: a Rerun file, but not a recording"):
+        read(path)
+    path.write_bytes(b"something else")
+    with pytest.raises(RecordingError, match=r"foreign\.rrd: not a Rerun recording"):
+        read_rerun(path)
+    with pytest.raises(RecordingError, match=r"none\.rrd: No such file"):
+        read_rerun(tmp_path / "none.rrd")
+
+
+def test_newer_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recording of a newer brrt says so."""
+    path = tmp_path / "run.rrd"
+    write(path, SCENARIOS["unsolved"])
+    monkeypatch.setattr("brrt.scenario.Manifest.FORMAT", "0")
+    with pytest.raises(RecordingError, match=r"run\.rrd: recording format '1' .* update brrt"):
+        read(path)
+
+
+def test_unwritable_path(tmp_path: Path) -> None:
+    """A file that cannot be made is told before the run."""
+    run = Run(SCENARIOS["unsolved"])
+    with pytest.raises(RecordingError, match=r"cannot write .*none/run\.rrd: No such file"):
+        RerunSink(run.manifest, run.problem.world, path=tmp_path / "none" / "run.rrd")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_full_disk() -> None:
+    """A disk that is full from the start is one clear line, and nothing hangs."""
+    with pytest.raises(RecordingError, match="cannot write /dev/full: No space left on device"):
+        write(Path("/dev/full"), SCENARIOS["2d"])
+
+
+@contextmanager
+def files_limited_to(size: int) -> Iterator[None]:
+    """Let writing fail beyond a size, as a disk does that fills up."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_disk_that_fills_up(tmp_path: Path) -> None:
+    """A disk that fills up in the middle of a run is one clear line, and nothing hangs."""
+    path = tmp_path / "run.rrd"
+    with (
+        files_limited_to(200_000),
+        pytest.raises(RecordingError, match=r"cannot write .*run\.rrd: File too large"),
+    ):
+        write(path, SCENARIOS["2d"])
+    assert path.stat().st_size == 200_000
+
+
+def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The run and its file do not mind that someone closes the viewer."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = int(free.getsockname()[1])
+    monkeypatch.setattr(rerun, "_PORT", port)
+    monkeypatch.setattr(rr, "spawn", lambda **_: None)
+    viewer = rr.RecordingStream("viewer", send_properties=False)
+    viewer.serve_grpc(grpc_port=port)
+    run, memory = Run(SCENARIOS["2d"], batch=50), Memory()
+    sink = RerunSink(run.manifest, run.problem.world, path=tmp_path / "run.rrd", view=True)
+    for number, batch in enumerate(run.events()):
+        sink.write(batch)
+        memory.write(batch)
+        if number == 3:
+            viewer.disconnect()
+    sink.close(whole=True)
+    assert same(read(tmp_path / "run.rrd").events(), memory.events())
+
+
+def test_no_viewer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A viewer that does not start is told in one line."""
+
+    def spawn(**_: object) -> None:
+        raise RuntimeError("Failed to find it.\n\nMore about that.")
+
+    monkeypatch.setattr(rr, "spawn", spawn)
+    run = Run(SCENARIOS["unsolved"])
+    with pytest.raises(RecordingError) as told:
+        RerunSink(run.manifest, run.problem.world, view=True)
+    assert str(told.value) == "cannot open the Rerun viewer: Failed to find it."
