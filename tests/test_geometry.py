@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
+from brrt.kernels.jit import kernel
 from brrt.worlds import World
 
 from . import naive
@@ -32,9 +33,15 @@ def world_of(
     return World("test", np.full(dim, low), np.full(dim, high), *arrays)
 
 
+@kernel
+def first_to_second(obstacles: Obstacles, ends: Floats) -> bool:
+    """Whether the segment between two rows touches an obstacle."""
+    return segment_hits(obstacles, ends, 0, ends, 1)
+
+
 def compiled_hits(obstacles: Obstacles, a: Floats, b: Floats) -> bool:
     """Ask the kernel about one segment."""
-    return bool(segment_hits(obstacles, np.array([a, b]), 0, np.array([a, b]), 1))
+    return bool(first_to_second(obstacles, np.array([a, b])))
 
 
 def check(world: World, segments: Iterator[Segment] | list[Segment]) -> None:

@@ -55,6 +55,15 @@ def nearest_of_all(
         nodes[row] = nearest(tree, space, queries, row)
 
 
+def test_python_is_refused() -> None:
+    """What only kernels may call says so; without its wrapper a call would be a crash."""
+    points = np.zeros((2, 2))
+    tree, space = rooted_kdtree(points[0], 4), space_of(2)
+    nearest_of_all(tree, space, points, np.zeros(2, np.int64))
+    with pytest.raises(TypeError, match="nearest is called by kernels alone"):
+        nearest(tree, space, points, 0)
+
+
 def planted(points: Floats, capacity: int = 4) -> KdTree:
     """The tree of all points, inserted one by one, grown whenever it is full."""
     space, tree = space_of(points.shape[1]), rooted_kdtree(points[0], capacity)

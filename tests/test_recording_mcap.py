@@ -3,6 +3,7 @@
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,7 +89,7 @@ def test_rosbags_decodes_every_message(tmp_path: Path) -> None:
     """Rosbags opens the bare file and reads every message."""
     _, log = write(tmp_path / "run.mcap", SCENARIOS["2d"])
     with AnyReader([tmp_path / "run.mcap"]) as reader:
-        decoded = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages()]
+        decoded: list[Any] = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages()]
     assert len(decoded) == len(log)
     costs = [m.cost for m in decoded if type(m).__name__.endswith("Edge")]
     assert np.array_equal(costs, log[Kind.EDGE]["cost"])

@@ -1,11 +1,11 @@
 """Rerun recordings: exact, readable by stock tools, drawn in time, and honest about damage."""
 
-import json
 import os
+import re
 import resource
-import shutil
 import socket
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
-import rerun_cli
 from hypothesis import given
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
@@ -23,13 +22,14 @@ from brrt import Events, Kind, RecordingError, Run, Scenario, read
 from brrt.events import FIELDS, Stage, table_dtype
 from brrt.recording import Memory, drawing, rerun, scene, tree_sketch
 from brrt.recording.rerun import RerunSink, read_rerun, recording_id
+from brrt.recording.stamp import BLANK
 
 SCENARIOS = {
     "2d": Scenario(world="circles2d:n=30", seed=7, clock="logical", params={"step": 2.0}),
-    "3d": Scenario(world="boxes3d:n=60", seed=1),
+    "boxes2d": Scenario(world="boxes2d:n=30", seed=2),
+    "3d": Scenario(world="boxes3d:n=60", seed=1, params={"step": 1.5}),
     "unsolved": Scenario(world="spheres3d:n=9", iterations=40),
 }
-PROGRAM = Path(str(rerun_cli.__file__)).with_name("rerun")
 
 
 def write(path: Path, scenario: Scenario, *, batch: int = 50) -> tuple[Run, Events]:
@@ -138,7 +138,7 @@ def test_stock_command_reads_it(tmp_path: Path) -> None:
 def rerun_command(folder: Path, *args: str) -> str:
     """Run Rerun's own program; a new home each time keeps it from sending anything anywhere."""
     done = subprocess.run(
-        [str(PROGRAM), *args],
+        [sys.executable, "-m", "rerun_cli", *args],
         cwd=folder,
         env={**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder)},
         capture_output=True,
@@ -176,6 +176,23 @@ def test_edges_are_drawn_from_their_parents(tmp_path: Path) -> None:
     assert np.array_equal(strips, wanted.astype(np.float32))
 
 
+def test_tree_of_many_nodes(tmp_path: Path) -> None:
+    """A long chain that comes in several batches is drawn link by link."""
+    run, count = Run(SCENARIOS["2d"]), 3000
+    edges = np.zeros(count, table_dtype(Kind.EDGE, 2))
+    edges["seq"] = edges["node"] = np.arange(count)
+    edges["parent"] = edges["node"] - 1
+    edges["q"] = np.random.default_rng(0).random((count, 2))
+    path = tmp_path / "run.rrd"
+    sink = RerunSink(run.manifest, run.problem.world, path=path)
+    for part in np.array_split(edges, 7):
+        sink.write(Events(2, {Kind.EDGE: part}))
+    sink.close(whole=True)
+    strips = np.concatenate([np.array(row) for row in column(path, "/world/tree/start", ":strips")])
+    wanted = np.stack([edges["q"][:-1], edges["q"][1:]], axis=1)
+    assert np.array_equal(strips, wanted.astype(np.float32))
+
+
 def test_path_shrinks_to_the_smoothed_one(tmp_path: Path) -> None:
     """The path is drawn after each accepted shortcut, and in the end as the smoother left it."""
     path = tmp_path / "run.rrd"
@@ -208,7 +225,7 @@ def test_long_runs_are_thinned_out(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(drawing, "DRAWN_IN_FULL", 100)
     monkeypatch.setattr(tree_sketch, "DRAWN_IN_FULL", 100)
     monkeypatch.setattr(tree_sketch, "_CELLS", 64)
-    monkeypatch.setattr(tree_sketch, "_KEPT_NODES", 300)
+    monkeypatch.setattr(tree_sketch, "_KEPT_NODES", 120)
     monkeypatch.setattr(drawing, "_FADING_IN_FULL", 50)
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["2d"])
@@ -234,7 +251,9 @@ def test_trees_have_names_and_colours(tmp_path: Path) -> None:
     sink = RerunSink(run.manifest, run.problem.world, path=path)
     sink.write(Events(2, {Kind.EDGE: edges}))
     sink.close(whole=True)
-    assert [len(column(path, f"/world/tree/{name}", ":strips")) for name in ("start", "goal", "2")] == [
+    assert [
+        len(column(path, f"/world/tree/{name}", ":strips")) for name in ("start", "goal", "2")
+    ] == [
         1,
         1,
         1,
@@ -285,7 +304,9 @@ def test_cut_file(tmp_path: Path) -> None:
     _, log = write(path, SCENARIOS["2d"])
     data = path.read_bytes()
     (tmp_path / "cut.rrd").write_bytes(data[: len(data) * 2 // 5])
-    with pytest.raises(RecordingError, match=r"cut\.rrd: cut or damaged .*`rerun rrd merge ") as told:
+    with pytest.raises(
+        RecordingError, match=r"cut\.rrd: cut or damaged .*`rerun rrd merge "
+    ) as told:
         read(tmp_path / "cut.rrd")
     assert "\n" not in str(told.value)
     rerun_command(tmp_path, "rrd", "merge", "cut.rrd", "-o", "whole.rrd")
@@ -303,55 +324,59 @@ def test_cut_anywhere(tmp_path: Path) -> None:
     data = path.read_bytes()
     for length in [0, 3, 4, 12, 50, *range(100, len(data), len(data) // 40), len(data) - 1]:
         path.write_bytes(data[:length])
-        check_damaged(path, log)
+        try:
+            found = list(read_rerun(path).batches())
+        except RecordingError as error:
+            assert str(error).startswith(str(path))
+            assert "\n" not in str(error)
+        else:
+            assert all(same(batch, log.until(seq=len(batch) - 1)) for batch in found)
 
 
 def test_flipped_bits(tmp_path: Path) -> None:
-    """Any flipped bit is found, unless it sits in the picture alone."""
+    """Any flipped bit is found, before Rerun stumbles over it."""
     path = tmp_path / "run.rrd"
-    _, log = write(path, SCENARIOS["unsolved"], batch=16384)
+    write(path, SCENARIOS["unsolved"])
     data = path.read_bytes()
+    at = data.index(b"!crc#")
     rng = np.random.default_rng(0)
-    found = 0
-    for _ in range(150):
+    for place in rng.integers(len(data), size=300):
         damaged = bytearray(data)
-        damaged[rng.integers(len(data))] ^= 1 << rng.integers(8)
+        damaged[place] ^= 1 << rng.integers(8)
         path.write_bytes(damaged)
-        found += check_damaged(path, log)
-    assert found > 10
+        if not at <= place < at + len(BLANK):
+            with pytest.raises(
+                RecordingError, match=r"run\.rrd: (damaged: the checksum|not a Rerun)"
+            ):
+                read_rerun(path)
 
 
-def check_damaged(path: Path, log: Events) -> bool:
-    """Assert that a file tells the truth or raises; return whether it raised."""
-    try:
-        recording = read_rerun(path)
-    except RecordingError as error:
-        assert str(error).startswith(str(path))
-        assert "\n" not in str(error)
-        return True
-    events = recording.events() if any(True for _ in recording.batches()) else None
-    if recording.result is not None:
-        assert events is not None
-        assert same(events, log)
-    elif events is not None:
-        assert same(events, log.until(seq=len(events) - 1))
-    return False
+def test_damaged_stamp(tmp_path: Path) -> None:
+    """Where the checksum itself is damaged, the events are read all the same."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, SCENARIOS["unsolved"])
+    data = path.read_bytes()
+    assert len(re.findall(rb"!crc#[0-9a-f]{24}#!", data)) == 1
+    path.write_bytes(data.replace(b"!crc#", b"!CRC#"))
+    assert same(read(path).events(), log)
 
 
-def test_flipped_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A number that changed on the way is found by the checksums."""
+def test_written_anew_by_other_tools(tmp_path: Path) -> None:
+    """A recording that Rerun's tools have put into another form has the same events."""
+    _, log = write(tmp_path / "run.rrd", SCENARIOS["2d"])
+    rerun_command(tmp_path, "rrd", "optimize", "run.rrd", "-o", "other.rrd")
+    recording = read(tmp_path / "other.rrd")
+    assert same(recording.events(), log)
+    assert recording.result == recording.metrics().as_dict()
+
+
+def test_missing_events(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that was closed, and lacks events, is an error."""
     path = tmp_path / "run.rrd"
     write(path, SCENARIOS["unsolved"])
     load = rerun._load
-
-    def changed(path: Path) -> dict[str, list[Any]]:
-        found = load(path)
-        found["/ev/sample"] = [b.set_column(0, b.schema.field(0), b.column(0)) for b in found["/ev/sample"]]
-        found["/ev/edge"] = found["/ev/edge"][:-1]
-        return found
-
-    monkeypatch.setattr(rerun, "_load", changed)
-    with pytest.raises(RecordingError, match="the checksums do not match"):
+    monkeypatch.setattr(rerun, "_load", lambda path: load(path) | {"/ev/edge": []})
+    with pytest.raises(RecordingError, match=r"run\.rrd: damaged: \d+ events were written, 1 are"):
         read_rerun(path)
 
 
@@ -407,12 +432,16 @@ def files_limited_to(size: int) -> Iterator[None]:
 
 def test_disk_that_fills_up(tmp_path: Path) -> None:
     """A disk that fills up in the middle of a run is one clear line, and nothing hangs."""
-    path = tmp_path / "run.rrd"
-    with (
-        files_limited_to(200_000),
-        pytest.raises(RecordingError, match=r"cannot write .*run\.rrd: File too large"),
-    ):
-        write(path, SCENARIOS["2d"])
+    run, path = Run(SCENARIOS["2d"], batch=50), tmp_path / "run.rrd"
+    batches = list(run.events())
+    sink = RerunSink(run.manifest, run.problem.world, path=path)
+    message = r"cannot write .*run\.rrd: File too large"
+    with files_limited_to(200_000):
+        with pytest.raises(RecordingError, match=message):
+            for batch in batches * 3:
+                sink.write(batch)
+        with pytest.raises(RecordingError, match=message):
+            sink.close(whole=False)
     assert path.stat().st_size == 200_000
 
 

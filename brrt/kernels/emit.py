@@ -154,7 +154,10 @@ class EventLog:
         """Make a batch large enough for so many events, which a planner emits in one go."""
         if events > len(self.buffer.kind):
             larger = type(self)(self.dof, events).buffer
-            for new, old in zip(larger[1:], self.buffer[1:], strict=True):
+            columns: list[tuple[NDArray[Any], NDArray[Any]]] = list(
+                zip(larger[1:], self.buffer[1:], strict=True)
+            )
+            for new, old in columns:
                 new[: len(old)] = old
             self.buffer = larger._replace(state=self.buffer.state)
 
@@ -204,7 +207,11 @@ class EventLog:
         """Hand out the events held so far, and begin anew."""
         n = len(self)
         first = int(self.buffer.state[_FIRST_SEQ])
-        held = _Held(first, self.dof, *(a[:n].copy() for a in self.buffer[1:]), self._ragged)
+        b = self.buffer
+        held = _Held(
+            first, self.dof, b.kind[:n].copy(), b.t[:n].copy(), b.iteration[:n].copy(),
+            b.ints[:n].copy(), b.real[:n].copy(), b.q[:n].copy(), self._ragged,
+        )  # fmt: skip
         self._ragged = {}
         self.buffer.state[_FIRST_SEQ] += n
         self.buffer.state[_COUNT] = 0

@@ -76,13 +76,9 @@ def build_obstacles(world: World) -> Obstacles:
             break
         edge *= 1.5
     starts, items = _entries(first.astype(np.int64), spans, shape)
-    return Obstacles(
-        *(tuple(a.tolist()) for a in (world.lower, cell, 1.0 / cell, shape)),
-        starts,
-        items,
-        balls,
-        boxes,
-    )
+    corner, edges, counts = (tuple(a.tolist()) for a in (world.lower, cell, shape))
+    per_length = tuple((1.0 / cell).tolist())
+    return Obstacles(corner, edges, per_length, counts, starts, items, balls, boxes)
 
 
 def _entries(

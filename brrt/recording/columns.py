@@ -1,8 +1,6 @@
-"""Events as Arrow columns, the way Rerun takes them, and back; and checksums over them."""
+"""Events as Arrow columns, the way Rerun takes them, and back."""
 
-import json
-import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,36 +8,30 @@ import pyarrow  # noqa: ICN001 - it gets that name below
 import rerun as rr
 from numpy.typing import NDArray
 
-from brrt.events import Field, Kind, Table
+from brrt.events import Field, Table
 
 pa: Any = pyarrow  # mypy knows none of its names
-
-Columns = Mapping[str, NDArray[Any]]
 
 TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
 """The timelines, and the column of the events that each holds."""
 
 
-def split(table: Table) -> Columns:
-    """Return the columns of events by name, each without gaps, as pyarrow and zlib want them."""
-    return {name: np.ascontiguousarray(table[name]) for name in table.dtype.names or ()}
-
-
-def time_columns(events: Columns | Table) -> list[rr.TimeColumn]:
+def time_columns(rows: Table) -> list[rr.TimeColumn]:
     """Return the timelines of events, exact to the nanosecond."""
     return [
-        rr.TimeColumn("iteration", sequence=np.ascontiguousarray(events["iteration"])),
-        rr.TimeColumn("event", sequence=np.ascontiguousarray(events["seq"])),
-        rr.TimeColumn("t", duration=events["t"].astype("m8[ns]")),
+        rr.TimeColumn("iteration", sequence=np.ascontiguousarray(rows["iteration"])),
+        rr.TimeColumn("event", sequence=np.ascontiguousarray(rows["seq"])),
+        rr.TimeColumn("t", duration=rows["t"].astype("m8[ns]")),
     ]
 
 
 def to_arrow(field: Field, values: NDArray[Any]) -> Any:
-    """Return a field of any type, without gaps, as an Arrow array with one value a row."""
+    """Return a field of any type as an Arrow array with one value a row."""
     if field.type == "q[]":
         flat = [np.ravel(row) for row in values]
         offsets = np.cumsum([0, *map(len, flat)], dtype=np.int32)
         return pa.ListArray.from_arrays(offsets, pa.array(np.concatenate(flat), pa.float64()))
+    values = np.ascontiguousarray(values)  # pyarrow copies what has gaps value by value
     if field.type == "q":
         return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
     return pa.array(values)
@@ -81,32 +73,3 @@ def line_strips(places: NDArray[np.float32], lengths: int | Sequence[int]) -> An
     arrow = batch._ARROW_DATATYPE  # noqa: SLF001 - only this very type is taken as it is
     points = pa.FixedSizeListArray.from_arrays(places.reshape(-1), type=arrow.value_type)
     return pa.ListArray.from_arrays(offsets, points, type=arrow)
-
-
-class Checksums:
-    """CRC-32 of each column of the events, however they are cut into batches.
-
-    Rerun's format has none: of 300 files with one bit flipped, 201 were read without an error.
-    """
-
-    def __init__(self) -> None:
-        self._sums: dict[str, int] = {}
-
-    def add(self, name: str, data: Any) -> None:
-        """Take in the next part of a column, bytes or an array without gaps."""
-        self._sums[name] = zlib.crc32(data, self._sums.get(name, 0))
-
-    def write(self, kind: Kind, columns: Columns) -> None:
-        """Take in events of one kind."""
-        for column, values in columns.items():
-            name = f"{kind.label}.{column}"
-            if not values.dtype.hasobject:
-                self.add(name, values)
-                continue
-            for row in values:
-                self.add(f"{name} sizes", row.size.to_bytes(8, "little"))
-                self.add(name, np.ascontiguousarray(row))
-
-    def to_json(self) -> str:
-        """Return the sums as text, equal for equal events."""
-        return json.dumps(self._sums, sort_keys=True)

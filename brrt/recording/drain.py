@@ -20,7 +20,7 @@ class Drain:
         path: The file; it is overwritten.
 
     Attributes:
-        inlet: File name to write to; it can be opened until `seal` is called.
+        inlet: File name to write to; it can be opened until `leave` is called.
 
     Raises:
         RecordingError: The file cannot be written.
@@ -39,7 +39,7 @@ class Drain:
         self._thread = threading.Thread(target=self._work, name="brrt drain", daemon=True)
         self._thread.start()
 
-    def seal(self) -> None:
+    def leave(self) -> None:
         """Leave the pipe to who has opened the inlet: once they close it, the file is complete."""
         if self._inlet is not None:
             os.close(self._inlet)
@@ -56,7 +56,7 @@ class Drain:
 
     def close(self) -> None:
         """Wait for the end of the pipe, then check."""
-        self.seal()
+        self.leave()
         self._thread.join()
         self.check()
 

@@ -15,11 +15,12 @@ from rerun.chunk import RrdReader
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, Table, table_dtype
-from brrt.recording.columns import TIMELINES, Checksums, from_arrow, split, time_columns, to_arrow
+from brrt.recording.columns import TIMELINES, from_arrow, time_columns, to_arrow
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
 from brrt.recording.recording import Recording
 from brrt.recording.scene import blueprint, document
+from brrt.recording.stamp import BLANK, is_damaged, stamp
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -35,7 +36,7 @@ _BATCH = 1 << 16
 class RerunSink:
     """Writes every event, exactly, to an .rrd file or a live viewer, and draws what happens.
 
-    Manifest and world come first; checksums and, if the run ended well, its figures come last.
+    Manifest and world come first; if the run ended well, its figures come last.
 
     Args:
         manifest: The run's.
@@ -53,7 +54,7 @@ class RerunSink:
     ) -> None:
         rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
         self._manifest, self._view = manifest, view
-        self._metrics, self._checksums = Metrics(manifest), Checksums()
+        self._path, self._metrics = path, Metrics(manifest)
         self._layout = blueprint(manifest, world)
         self._rec: Any = rr.RecordingStream(
             APPLICATION, recording_id=recording_id(manifest), send_properties=False
@@ -78,11 +79,10 @@ class RerunSink:
             RecordingError: The disk is full, or something else is wrong with the file.
         """
         for kind, table in events.tables.items():
-            entity, columns = f"{_EVENTS}{kind.label}", split(table)
-            values = {field.name: to_arrow(field, columns[field.name]) for field in FIELDS[kind]}
+            entity = f"{_EVENTS}{kind.label}"
+            values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
             components = rr.DynamicArchetype.columns(_archetype(entity), components=values)
-            self._rec.send_columns(entity, time_columns(columns), components)
-            self._checksums.write(kind, columns)
+            self._rec.send_columns(entity, time_columns(table), components)
         self._drawing.write(events)
         self._metrics.write(events)
         self._flush()
@@ -96,9 +96,9 @@ class RerunSink:
         if self._rec is None:
             return
         try:
-            end = {"checksums": self._checksums.to_json()}
+            figures = self._metrics.as_dict()
+            end = {"events": str(figures["events"]), "stamp": BLANK}
             if whole:
-                figures = self._metrics.as_dict()
                 end["result"] = json.dumps(figures)
                 self._document(document(self._manifest, figures))
             self._write_texts(_END, end)
@@ -119,7 +119,7 @@ class RerunSink:
             sinks.append(rr.FileSink(self._drain.inlet))
             self._rec.set_sinks(*sinks, default_blueprint=layout)
         finally:
-            self._drain.seal()
+            self._drain.leave()
 
     def _disconnect(self) -> None:
         try:
@@ -128,6 +128,11 @@ class RerunSink:
             self._rec = None
             if self._drain is not None:
                 self._drain.close()
+        if self._path is not None and self._path.is_file():
+            try:
+                stamp(self._path)
+            except OSError as error:
+                raise RecordingError(f"cannot write {self._path}: {error.strerror}") from None
 
     def _write_head(self, world: World) -> None:
         texts = {
@@ -136,7 +141,6 @@ class RerunSink:
         }
         for entity, text in texts.items():
             self._write_texts(entity, {"json": text})
-            self._checksums.add(entity, text.encode())
         self._document(document(self._manifest))
 
     def _write_texts(self, entity: str, texts: dict[str, str]) -> None:
@@ -213,10 +217,13 @@ def _load(path: Path) -> dict[str, list[Any]]:
     try:
         with path.open("rb") as file:
             magic = file.read(len(_MAGIC))
+        damaged = magic == _MAGIC and is_damaged(path)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     if magic != _MAGIC:
         raise RecordingError(f"{path}: not a Rerun recording")
+    if damaged:
+        raise RecordingError(f"{path}: damaged: the checksum does not match")
     found: dict[str, list[Any]] = {}
     try:
         with warnings.catch_warnings():
@@ -239,15 +246,9 @@ def _recording(chunks: dict[str, list[Any]]) -> Recording:
     manifest = Manifest.from_strings(json.loads(texts[_MANIFEST]))
     world = World.from_json(texts[_WORLD])
     events = _events(chunks, manifest.dof)
-    expected, result = (_text(chunks, _END, name) for name in ("checksums", "result"))
-    if expected is not None:
-        sums = Checksums()
-        for entity, text in texts.items():
-            sums.add(entity, text.encode())
-        for kind, table in events.tables.items():
-            sums.write(kind, split(table))
-        if sums.to_json() != expected:
-            raise BrrtError("damaged: the checksums do not match")
+    stated, result = (_text(chunks, _END, name) for name in ("events", "result"))
+    if stated is not None and int(stated) != len(events):
+        raise BrrtError(f"damaged: {stated} events were written, {len(events)} are there")
     figures = None if result is None else json.loads(result)
     return Recording(manifest, world, lambda: _batches(events), figures)
 

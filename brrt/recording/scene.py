@@ -84,7 +84,9 @@ def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None
 
 def _mark(place: NDArray[np.float32], colour: Colour, extent: float) -> Any:
     if place.shape[1] == 2:
-        return rr.LineStrips2D(_discs(place, 1e-6 * extent), colors=colour, radii=-7, draw_order=100)
+        return rr.LineStrips2D(
+            _discs(place, 1e-6 * extent), colors=colour, radii=-7, draw_order=100
+        )
     return rr.Points3D(place, colors=colour, radii=-7)
 
 

@@ -95,10 +95,10 @@ def _compare(a: Events, b: Events) -> Difference | None:
         if limit < first + max(len(kinds), len(other_kinds)):
             seqs.append(limit)
         for kind in Kind:
-            ours, theirs = (e.until(seq=limit - 1)[kind] for e in (a, b))
-            wrong = np.flatnonzero(_unequal(kind, ours, theirs))
+            left, right = (e.until(seq=limit - 1)[kind] for e in (a, b))
+            wrong = np.flatnonzero(_unequal(kind, left, right))
             if len(wrong):
-                seqs.append(int(ours["seq"][wrong[0]]))
+                seqs.append(int(left["seq"][wrong[0]]))
     if not seqs:
         return None
     seq = min(seqs)
