@@ -78,8 +78,10 @@ def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None
         place = places([q], manifest.dim)
         rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
         # Rerun writes a label across its point; this one stands below.
-        place[0, -1] -= 0.012 * world.extent
-        rec.log(f"/world/{name}/label", _label(place, colour, name), static=True)
+        below = (
+            place - np.float32(0.012 * world.extent) * np.eye(manifest.dim, dtype=np.float32)[-1]
+        )
+        rec.log(f"/world/{name}/label", _label(below, colour, name), static=True)
 
 
 def _mark(place: NDArray[np.float32], colour: Colour, extent: float) -> Any:
