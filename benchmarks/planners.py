@@ -93,17 +93,20 @@ def theirs(program: Path, world: Path, case: Case, seeds: range) -> list[float]:
     return [r["ms"] for r in runs]
 
 
-def ours(case: Case, folder: Path, seed: int) -> float:
-    """Milliseconds of one of our runs, everything recorded."""
-    scenario = Scenario(
-        world=case.world, start=case.start, goal=case.goal, seed=seed, smooth=False,
-        params={"step": case.step, "goal_bias": 0.05},
-    )  # fmt: skip
-    run = Run(scenario)
-    sink = McapSink(folder / "run.mcap", run.manifest, run.problem.world)
-    figures = run.execute([Background(sink)]).as_dict()
-    assert figures["solved"], case.name  # noqa: S101
-    return float(figures["plan_time_s"]) * 1e3
+def ours(case: Case, folder: Path, seeds: range) -> list[float]:
+    """Milliseconds of each of our runs, everything recorded; prepared first, as the peer is."""
+    prepared = []
+    for seed in seeds:
+        scenario = Scenario(
+            world=case.world, start=case.start, goal=case.goal, seed=seed, smooth=False,
+            params={"step": case.step, "goal_bias": 0.05},
+        )  # fmt: skip
+        run = Run(scenario)
+        sink = McapSink(folder / f"{seed}.mcap", run.manifest, run.problem.world)
+        prepared.append((run, Background(sink)))
+    all_figures = [run.execute([sink]).as_dict() for run, sink in prepared]
+    assert all(figures["solved"] for figures in all_figures), case.name  # noqa: S101
+    return [float(figures["plan_time_s"]) * 1e3 for figures in all_figures]
 
 
 def main() -> None:
@@ -131,7 +134,7 @@ def measure(case: Case, program: Path, folder: Path, seeds: int) -> None:
     for first in range(0, seeds, 5):
         turn = range(first, min(first + 5, seeds))
         peer += theirs(program, world, case, turn)
-        mine += [ours(case, folder, seed) for seed in turn]
+        mine += ours(case, folder, turn)
     a, b = statistics.median(peer), statistics.median(mine)
     print(f"{case.name:26}{a:10.3f}{b:10.3f}{b / a:8.2f}{case.bar:6.2g}", flush=True)
 

@@ -63,6 +63,21 @@ def kernel(fn: F) -> F:
     return _compiled(fn, {})
 
 
+def prepared(fn: F, *args: Any) -> F:
+    """Compile or load a kernel for arguments like these, and return its way in.
+
+    Numba looks up the type of every array in every argument at each call, 50 us for a planner's
+    and five times that with cold caches: longer than many a query takes to solve. The way in that
+    is returned knows them already; give it arguments of the same types.
+    """
+    if config.DISABLE_JIT:
+        return fn
+    dispatcher: Any = fn
+    signature = tuple(numba.typeof(arg) for arg in args)
+    dispatcher.compile(signature)
+    return cast("F", dispatcher.overloads[signature].entry_point)
+
+
 def inlined(fn: F) -> F:
     """Compile `fn` as `kernel` does, into every kernel that calls it; Python cannot call it."""
     return _compiled(fn, INLINED)
