@@ -39,7 +39,7 @@ class Run:
         BrrtError: The scenario is of no use; nothing has been written anywhere.
     """
 
-    def __init__(self, scenario: Scenario, *, batch: int = 16384) -> None:
+    def __init__(self, scenario: Scenario, *, batch: int = 8192) -> None:
         self.problem = scenario.make_problem()
         self._planner, self._smoother = scenario.make_planner(), scenario.make_smoother()
         self._compile()

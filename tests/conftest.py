@@ -11,8 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from brrt import Events, Memory, Run, Scenario
+
+# On a busy machine the first example of a strategy may take seconds; that is no finding.
+settings.register_profile("brrt", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("brrt")
 
 
 @dataclass(frozen=True)

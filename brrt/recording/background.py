@@ -6,7 +6,7 @@ import threading
 from brrt.events import Events
 from brrt.run import Sink
 
-_BATCHES = 4
+_BATCHES = 2
 """Batches in waiting; a planner that is faster than the disk waits for it."""
 
 

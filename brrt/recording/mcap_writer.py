@@ -25,7 +25,7 @@ MAGIC = b"\x89MCAP0\r\n"
 RUN, RESULT, WORLD = "brrt.run", "brrt.result", "world.json"
 """Names of the metadata and of the attachment."""
 
-_CHUNK_EVENTS = 8192
+_CHUNK_EVENTS = 8000
 _CHUNK_SECONDS = 1.0
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 

@@ -9,12 +9,17 @@ and is taken as it is.
 
 import re
 import zlib
-from mmap import ACCESS_COPY, mmap
+from os import SEEK_END
 from pathlib import Path
+from typing import IO
 
 _BEGIN, _END = "!crc#", "#!"
 BLANK = f"{_BEGIN}QZ~jX^vK%wJ`yH&zP|uF*tB+{_END}"
 """Letters of which no four come together anywhere else, so that compression leaves them alone."""
+
+_BLOCK = 1 << 20
+_TAIL = 1 << 22
+"""The blank is written last but for the index of chunks, a few dozen bytes for each of them."""
 
 _STAMP = re.compile(f"{_BEGIN}([0-9a-f]{{16}})([0-9a-f]{{8}}){_END}".encode())
 
@@ -25,11 +30,12 @@ def stamp(path: Path) -> None:
     Raises:
         OSError: The file cannot be changed.
     """
-    with path.open("r+b") as file, mmap(file.fileno(), 0) as data:
-        at = data.rfind(BLANK.encode())
+    with path.open("r+b") as file:
+        size, at = _find(file, BLANK)
         if at >= 0:
-            filled = f"{_BEGIN}{len(data):016x}{zlib.crc32(data):08x}{_END}"
-            data[at : at + len(BLANK)] = filled.encode()
+            filled = f"{_BEGIN}{size:016x}{_crc(file, 0, size):08x}{_END}"
+            file.seek(at)
+            file.write(filled.encode())
 
 
 def is_damaged(path: Path) -> bool:
@@ -38,12 +44,35 @@ def is_damaged(path: Path) -> bool:
     Raises:
         OSError: The file cannot be read.
     """
-    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_COPY) as data:
-        at = data.rfind(_BEGIN.encode())
-        found = _STAMP.match(data, max(at, 0))
-        if found is None or int(found[1], 16) != len(data):
+    with path.open("rb") as file:
+        size, at = _find(file, _BEGIN)
+        if at < 0:
             return False
-        stated = int(found[2], 16)
-        del found  # it would keep the map open
-        data[at : at + len(BLANK)] = BLANK.encode()  # in memory alone
-        return zlib.crc32(data) != stated
+        file.seek(at)
+        found = _STAMP.match(file.read(len(BLANK)))
+        if found is None or int(found[1], 16) != size:
+            return False
+        before = _crc(file, 0, at)
+        behind = at + len(BLANK)
+        whole = _crc(file, behind, size, zlib.crc32(BLANK.encode(), before))
+        return whole != int(found[2], 16)
+
+
+def _find(file: IO[bytes], text: str) -> tuple[int, int]:
+    """Return the file's size, and where a text stands last near its end; -1 if it does not."""
+    size = file.seek(0, SEEK_END)
+    begin = max(0, size - _TAIL)
+    file.seek(begin)
+    at = file.read().rfind(text.encode())
+    return size, at if at < 0 else begin + at
+
+
+def _crc(file: IO[bytes], begin: int, end: int, crc: int = 0) -> int:
+    """Checksum of a stretch of the file, read block by block: a map would count as memory."""
+    file.seek(begin)
+    while begin < end:
+        block = file.read(min(_BLOCK, end - begin))
+        if not block:
+            break
+        crc, begin = zlib.crc32(block, crc), begin + len(block)
+    return crc

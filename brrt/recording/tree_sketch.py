@@ -14,7 +14,7 @@ _CELLS = 1 << 16
 """Cells of the grid over the world that thins out what comes after: a cell then takes one edge. So
 a million edges stay a picture that a viewer can turn, and yet every place that is reached shows."""
 
-_KEPT_NODES = 1 << 22
+_KEPT_NODES = 1 << 19
 """Nodes whose places are kept (12 bytes each in 3D); edges that leave from later ones are not
 drawn."""
 
