@@ -1,7 +1,9 @@
 """Golden recordings replay, and are planned anew to the same events."""
 
 import importlib.util
+import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -11,6 +13,7 @@ import pytest
 import brrt
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
+PLAIN = ("circles2d-rrt", "boxes3d-line-of-sight")
 FILES = sorted(RECORDINGS.glob("*.mcap"))
 
 
@@ -78,3 +81,17 @@ def test_missing_unused_and_ci(golden: ModuleType, monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("CI", "1")
     with pytest.raises(SystemExit):
         run(golden, monkeypatch, "update")
+
+
+def test_kernels_run_as_plain_python_bit_for_bit() -> None:
+    """Without the compiler the same seed gives the same events."""
+    done = subprocess.run(
+        [sys.executable, str(RECORDINGS / "golden.py"), "check", *PLAIN],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    differing = [line for line in done.stdout.splitlines() if not line.endswith(": the same")]
+    assert not differing, done.stdout + done.stderr
+    assert all(name in done.stdout for name in PLAIN)

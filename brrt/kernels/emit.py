@@ -208,48 +208,45 @@ class EventLog:
         n = len(self)
         first = int(self.buffer.state[_FIRST_SEQ])
         b = self.buffer
-        held = _Held(
-            first, self.dof, b.kind[:n].copy(), b.t[:n].copy(), b.iteration[:n].copy(),
-            b.ints[:n].copy(), b.real[:n].copy(), b.q[:n].copy(), self._ragged,
+        columns = Buffer(
+            b.state, b.kind[:n].copy(), b.t[:n].copy(), b.iteration[:n].copy(),
+            b.ints[:n].copy(), b.real[:n].copy(), b.q[:n].copy(),
         )  # fmt: skip
+        held = _Held(first, self.dof, columns, self._ragged)
         self._ragged = {}
         self.buffer.state[_FIRST_SEQ] += n
         self.buffer.state[_COUNT] = 0
-        counts = np.bincount(held.kind, minlength=len(Kind))
+        counts = np.bincount(columns.kind, minlength=len(Kind))
         present = {Kind(int(code)): int(counts[code]) for code in np.flatnonzero(counts)}
-        last = Instant(int(held.t[-1]), int(held.iteration[-1])) if n else Instant(0, 0)
+        last = Instant(int(columns.t[-1]), int(columns.iteration[-1])) if n else Instant(0, 0)
         return Events(self.dof, LazyTables(present, last, held.table))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Held:
-    """The columns of a batch, out of the kernels' way; see `Buffer`."""
+    """A batch out of the kernels' way: its columns, and what is too long for them, by row."""
 
     first: int
     dof: int
-    kind: NDArray[np.uint8]
-    t: NDArray[np.int64]
-    iteration: NDArray[np.int64]
-    ints: NDArray[np.int32]
-    real: NDArray[np.float64]
-    q: NDArray[np.float64]
+    columns: Buffer
     ragged: Mapping[int, NDArray[np.float64]]
 
     def table(self, kind: Kind) -> Table:
         """Gather the events of a kind, its fields under their names."""
-        rows = np.flatnonzero(self.kind == kind)
+        columns = self.columns
+        rows = np.flatnonzero(columns.kind == kind)
         table = np.empty(len(rows), table_dtype(kind, self.dof))
         table["seq"] = rows + self.first
-        table["t"] = self.t[rows]
-        table["iteration"] = self.iteration[rows]
+        table["t"] = columns.t[rows]
+        table["iteration"] = columns.iteration[rows]
         for name, column, place in _SLOTS[kind]:
             if column == "ragged":
                 for i, row in enumerate(rows):
                     table[name][i] = self.ragged[int(row)]
             elif column == "ints":
-                table[name] = self.ints[rows, place]
+                table[name] = columns.ints[rows, place]
             elif column == "real":
-                table[name] = self.real[rows]
+                table[name] = columns.real[rows]
             else:
-                table[name] = self.q[rows]
+                table[name] = columns.q[rows]
         return table
