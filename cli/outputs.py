@@ -1,6 +1,7 @@
 """Which files a command writes: checked before anything is written."""
 
 import os
+import sys
 from pathlib import Path
 
 from brrt.errors import BrrtError
@@ -24,3 +25,15 @@ def check_output(path: Path | None, option: str, suffix: str, *, force: bool) ->
         raise BrrtError(f"{option} {path}: exists already; choose another name or add --force")
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise BrrtError(f"{option} {path}: no permission to write there")
+
+
+def check_display(*, view: bool) -> None:
+    """See that a viewer can open a window.
+
+    Raises:
+        BrrtError: There is no display; Rerun would wait for its viewer for ever.
+    """
+    if view and sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        raise BrrtError(
+            "--view needs a display and there is none; use --rrd, and open that elsewhere"
+        )

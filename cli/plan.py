@@ -129,7 +129,7 @@ def plan(
     from brrt.planners.stop import stop_on_signals  # noqa: PLC0415
     from brrt.run import Run  # noqa: PLC0415
 
-    from .outputs import check_output  # noqa: PLC0415
+    from .outputs import check_display, check_output  # noqa: PLC0415
 
     if not record and (mcap or rrd):
         raise BrrtError("--no-record contradicts --out and --rrd; leave one of them out")
@@ -137,6 +137,7 @@ def plan(
         mcap, rrd = Path("run.mcap"), Path("run.rrd")
     check_output(mcap, "--out", ".mcap", force=force)
     check_output(rrd, "--rrd", ".rrd", force=force)
+    check_display(view=view)
     given = {
         "world": world, "robot": robot, "start": start, "goal": goal, "planner": planner,
         "seed": seed, "iterations": iterations, "time": time, "smooth": smooth,

@@ -161,6 +161,11 @@ class EventLog:
                 new[: len(old)] = old
             self.buffer = larger._replace(state=self.buffer.state)
 
+    def begin(self) -> None:
+        """Let time count from now: what came before, such as opening files, is not the run's."""
+        self._origin = time.perf_counter_ns()
+        self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
+
     @property
     def elapsed_s(self) -> float:
         """Seconds since the log was opened."""

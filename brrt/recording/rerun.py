@@ -3,9 +3,11 @@
 import hashlib
 import importlib.util
 import json
+import os
 import shutil
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -176,16 +178,33 @@ def _open_viewer(rec: rr.RecordingStream) -> None:
     program = shutil.which("rerun", path=folder) or shutil.which("rerun")
     try:
         # Without a recording that is enabled, `spawn` does nothing.
-        rr.spawn(
-            port=_PORT,
-            connect=False,
-            hide_welcome_screen=True,
-            executable_path=program,
-            recording=rec,
-        )
+        with _nothing_to_inherit():
+            rr.spawn(
+                port=_PORT,
+                connect=False,
+                hide_welcome_screen=True,
+                executable_path=program,
+                recording=rec,
+            )
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[0]
         raise RecordingError(f"cannot open the Rerun viewer: {reason}") from None
+
+
+@contextmanager
+def _nothing_to_inherit() -> Iterator[None]:
+    """Keep our output from a child that outlives us: a pipe that we write to would never end."""
+    kept = {number: os.dup(number) for number in (1, 2)}
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for number in kept:
+            os.dup2(nowhere, number)
+        yield
+    finally:
+        for number, copy in kept.items():
+            os.dup2(copy, number)
+            os.close(copy)
+        os.close(nowhere)
 
 
 def _archetype(entity: str) -> str:
