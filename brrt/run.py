@@ -70,7 +70,6 @@ class Run:
         """Plan, then smooth; yield what happens, in batches."""
         rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
         path, iteration = None, 0
-        self._log.begin()
         for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
             for event in batch[Kind.PATH]:
                 path, iteration = event["waypoints"], int(event["iteration"])

@@ -34,6 +34,4 @@ def check_display(*, view: bool) -> None:
         BrrtError: There is no display; Rerun would wait for its viewer for ever.
     """
     if view and sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
-        raise BrrtError(
-            "--view needs a display and there is none; use --rrd, and open that elsewhere"
-        )
+        raise BrrtError("--view needs a display and there is none; use --rrd instead")

@@ -161,7 +161,7 @@ class EventLog:
                 new[: len(old)] = old
             self.buffer = larger._replace(state=self.buffer.state)
 
-    def begin(self) -> None:
+    def _begin(self) -> None:
         """Let time count from now: what came before, such as opening files, is not the run's."""
         self._origin = time.perf_counter_ns()
         self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
@@ -180,6 +180,8 @@ class EventLog:
             fields: Every field that `events.FIELDS` declares for the kind.
         """
         buffer, row, ints = self.buffer, len(self), 0
+        if row == 0 and self.buffer.state[_FIRST_SEQ] == 0:
+            self._begin()
         self.tick()
         for name, column, _ in _SLOTS[kind]:
             value = fields[name]
