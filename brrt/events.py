@@ -27,6 +27,11 @@ class Kind(IntEnum):
     EDGE = 3
     PATH = 4
     SHORTCUT = 5
+    REWIRE = 6
+    CONNECT = 7
+    EXPAND = 8
+    HEURISTIC = 9
+    MOVE = 10
 
     @property
     def label(self) -> str:
@@ -40,6 +45,7 @@ class Phase(IntEnum):
 
     PLAN = 0
     SMOOTH = 1
+    EXECUTE = 2
 
 
 @unique
@@ -60,6 +66,8 @@ class Source(IntEnum):
 
     UNIFORM = 0
     GOAL = 1
+    OTHER_TREE = 2
+    INFORMED = 3
 
 
 @unique
@@ -69,6 +77,10 @@ class Reason(IntEnum):
     COLLISION = 0
     NO_PROGRESS = 1
     GOAL_BLOCKED = 2
+    LINK_BLOCKED = 3
+    NEAR_BLOCKED = 4
+    NO_GAIN = 5
+    LIMITS = 6
 
 
 @unique
@@ -77,6 +89,7 @@ class Stage(IntEnum):
 
     RAW = 0
     SMOOTHED = 1
+    IMPROVED = 2
 
 
 EnumClass = type[IntEnum]
@@ -96,7 +109,7 @@ class Field:
     choices: "EnumClass | None" = None
 
 
-_TREE = Field("tree", "uint8", "0 grows from the start")
+_TREE = Field("tree", "uint8", "0 grows from the start, 1 from the goal")
 _Q = Field("q", "q", "configuration")
 
 FIELDS: Mapping[Kind, tuple[Field, ...]] = {
@@ -128,6 +141,35 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
         Field("j", "int32", "second waypoint"),
         Field("accepted", "bool", "whether the direct motion was free and replaced the detour"),
         Field("cost", "float64", "cost of the path after the attempt"),
+    ),
+    Kind.REWIRE: (
+        _TREE,
+        Field("node", "int32", "node that got a better parent; its descendants' costs follow"),
+        Field("parent", "int32", "the new parent"),
+        Field("cost", "float64", "its new cost-to-come"),
+    ),
+    Kind.CONNECT: (
+        Field("node", "int32", "node of tree 0"),
+        Field("other", "int32", "node of tree 1; the motion between the two is free"),
+        Field("cost", "float64", "cost of the path from start to goal over this link"),
+    ),
+    Kind.EXPAND: (
+        Field("cell", "int32", "cell of the lattice, numbered from 0, the start's, as first seen"),
+        Field("parent", "int32", "cell that it was reached from in this search; -1 for its first"),
+        Field("cost", "float64", "cost from this search's first cell"),
+        _Q,
+    ),
+    Kind.HEURISTIC: (
+        Field("cell", "int32", "cell whose estimate of the cost-to-go was raised"),
+        Field("h", "float64", "the new estimate; the first one is the distance to the goal"),
+        _Q,
+    ),
+    Kind.MOVE: (
+        Field("trial", "int32", "0, 1 ...: each trial begins at the start"),
+        Field("step", "int32", "moves of this trial so far, this one included"),
+        Field("cell", "int32", "cell of the lattice that it ends in; -1 where there is none"),
+        Field("cost", "float64", "length of this trial's moves so far, this one included"),
+        Field("q", "q", "where the robot moves to, straight"),
     ),
 }
 

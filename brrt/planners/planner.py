@@ -8,6 +8,7 @@ import numpy as np
 
 from brrt.events import Events
 from brrt.kernels.emit import EventLog
+from brrt.planners.contract import Contract
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import Settings
@@ -29,3 +30,7 @@ class Planner(Settings):
             log: Numbers and times the events.
             stop: Budget and interruption.
         """
+
+    def contract(self, problem: Problem) -> Contract:  # noqa: ARG002
+        """Say what a recording of this planner can be held to, beyond what all planners promise."""
+        return Contract()

@@ -12,6 +12,7 @@ from brrt.kernels.emit import EventLog
 from brrt.kernels.jit import prepared
 from brrt.kernels.kdtree import grown_kdtree, rooted_kdtree
 from brrt.planners import _rrt
+from brrt.planners.contract import Contract
 from brrt.planners.planner import Planner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
@@ -44,13 +45,20 @@ class RRT(Planner):
     slices: int = param(10, "points of a vector, with keep_intermediate", low=1, high=1000)
     count_failed: bool = param(True, "draws that add no node count as iterations")
 
+    def contract(self, problem: Problem) -> Contract:
+        """See `Planner.contract`."""
+        return Contract(step=self._step(problem), line_of_sight=self.goal_test == "line-of-sight")
+
+    def _step(self, problem: Problem) -> float:
+        return self.step or 0.05 * problem.world.extent
+
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
         space = problem.space
         options = _rrt.Options(
-            step=self.step or 0.05 * problem.world.extent,
+            step=self._step(problem),
             goal_bias=self.goal_bias,
             line_of_sight=self.goal_test == "line-of-sight",
             slices=self.slices if self.keep_intermediate else 1,

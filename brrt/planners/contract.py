@@ -1,0 +1,67 @@
+"""What a planner promises, in figures that a recording can be held to."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """The neighbourhood in which RRT* looks for parents: min(longest, gamma (log n / n)^(1/d)).
+
+    Attributes:
+        gamma: The factor, in units of the robot's metric.
+        longest: Never farther than this.
+        dof: d, numbers in a configuration.
+    """
+
+    gamma: float
+    longest: float
+    dof: int
+
+    def radius(self, n: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the radius in a tree that counts n nodes with the new one, shape of n."""
+        n = np.maximum(n, 2)
+        return np.minimum(self.longest, self.gamma * (np.log(n) / n) ** (1 / self.dof))
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """The grid that a search moves on; its origin is the start.
+
+    Attributes:
+        epsilon: Edge of a cell.
+        diagonals: Whether moves lead to all cells around (26 in 3D, 8 in 2D), or to 6 and 4.
+        max_move: The goal is reached by a straight move of at most this length.
+        lookahead: Cells expanded before each move; None where no robot moves meanwhile.
+    """
+
+    epsilon: float
+    diagonals: bool
+    max_move: float
+    lookahead: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Contract:
+    """What a planner promises beyond what all do; None promises nothing.
+
+    All planners promise: everything inside bounds and limits; edges, links and paths free; costs
+    that are parent's cost plus distance; no cycles; paths from start to goal whose cost is their
+    length. The checks take that for granted.
+
+    Attributes:
+        step: Longest edge of a tree (within rounding); an edge to the goal may be longer where
+            `line_of_sight`.
+        line_of_sight: Whether the goal may be joined from any distance.
+        link: Longest link between two trees.
+        near: Where parents are chosen and edges rewired.
+        lattice: The grid of a search.
+    """
+
+    step: float | None = None
+    line_of_sight: bool = False
+    link: float | None = None
+    near: Near | None = None
+    lattice: Lattice | None = None
