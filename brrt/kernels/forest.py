@@ -87,6 +87,15 @@ def lineage(forest: Forest, node: int) -> list[int]:
     return nodes[::-1]
 
 
+def joined(forest: Forest, start: int, goal: int) -> list[int]:
+    """Nodes from the root of one tree to `start`, and on from `goal` to the root of its tree.
+
+    Where the two nodes coincide, one of them is left out.
+    """
+    there, back = lineage(forest, start), lineage(forest, goal)[::-1]
+    return there + back[int((forest.q[start] == forest.q[goal]).all()) :]
+
+
 @inlined
 def fits(forest: Forest, nodes: int) -> bool:
     """Whether so many more nodes fit, and one of them among the neighbours."""
