@@ -5,15 +5,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind
-from brrt.kernels.emit import Buffer, emit
+from brrt.events import Kind, Phase, Status
+from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
 from brrt.kernels.jit import inlined
 from brrt.kernels.kdtree import KdTree, grown_kdtree, has_room, insert, rooted_kdtree
 from brrt.kernels.space import distance
 
 Floats = NDArray[np.float64]
 
-_EDGE = int(Kind.EDGE)
+_EDGE, _PATH, _PHASE = int(Kind.EDGE), int(Kind.PATH), int(Kind.PHASE)
+_PLAN, _SOLVED = int(Phase.PLAN), int(Status.SOLVED)
 
 RESERVED_NODES = 1 << 22
 """Room that is asked for at once. Memory is taken only as it fills, so asking costs nothing, and a
@@ -76,26 +77,6 @@ def grown(column: NDArray[Any], n: int, capacity: int) -> NDArray[Any]:
     return larger
 
 
-def lineage(forest: Forest, node: int) -> list[int]:
-    """Nodes from the root to `node`."""
-    # A view of the memory reads a number ten times as fast as an array does.
-    up: memoryview[int] = forest.parent.data
-    nodes = []
-    while node >= 0:
-        nodes.append(node)
-        node = up[node]
-    return nodes[::-1]
-
-
-def joined(forest: Forest, start: int, goal: int) -> list[int]:
-    """Nodes from the root of one tree to `start`, and on from `goal` to the root of its tree.
-
-    Where the two nodes coincide, one of them is left out.
-    """
-    there, back = lineage(forest, start), lineage(forest, goal)[::-1]
-    return there + back[int((forest.q[start] == forest.q[goal]).all()) :]
-
-
 @inlined
 def fits(forest: Forest, nodes: int) -> bool:
     """Whether so many more nodes fit, and one of them among the neighbours."""
@@ -120,3 +101,69 @@ def add(
     above = forest.number[parent]
     emit(log, _EDGE, iteration, tree, forest.number[node], above, forest.cost[node], Q, row)
     return node
+
+
+@inlined
+def emit_roots(forest: Forest, log: Buffer) -> None:
+    """Say where the trees begin."""
+    for root in range(len(forest.nodes) - 1):
+        emit(log, _EDGE, 0, root, 0, -1, 0.0, forest.q, root)
+
+
+@inlined
+def _depth(forest: Forest, node: int) -> int:
+    """Nodes from a root to `node`, both included; 0 for no node."""
+    depth = 0
+    while node >= 0:
+        depth += 1
+        node = forest.parent[node]
+    return depth
+
+
+@inlined
+def emit_path(
+    forest: Forest, log: Buffer, iteration: int, stage: int, cost: float, start: int, goal: int
+) -> int:
+    """Say that there is a path from the root of one tree to `start`, and on over `goal`.
+
+    Args:
+        forest: The trees.
+        log: Events.
+        iteration: The planner's count.
+        stage: A `Stage`.
+        cost: Its length.
+        start: A node of the tree that begins at the start.
+        goal: A node of the other tree, from which it leads down to the root; -1 for none. Where it
+            coincides with `start`, it is left out.
+
+    Returns:
+        0, or how many waypoints it has where these do not fit into the log any more; then nothing
+        was said.
+    """
+    there, back = _depth(forest, start), _depth(forest, goal)
+    if goal >= 0:
+        same = True
+        for k in range(forest.q.shape[1]):
+            same = same and forest.q[start, k] == forest.q[goal, k]
+        if same:
+            goal, back = forest.parent[goal], back - 1
+    n = there + back
+    if room(log) < 2 or point_room(log) < n:
+        return n
+    first = take_points(log, n)
+    for i in range(there):
+        for k in range(forest.q.shape[1]):
+            log.points[first + there - 1 - i, k] = forest.q[start, k]
+        start = forest.parent[start]
+    for i in range(there, n):
+        for k in range(forest.q.shape[1]):
+            log.points[first + i, k] = forest.q[goal, k]
+        goal = forest.parent[goal]
+    emit(log, _PATH, iteration, stage, first, n, cost, forest.q, 0)
+    return 0
+
+
+@inlined
+def emit_solved(log: Buffer, iteration: int) -> None:
+    """Say that planning has ended with a path; there is room where a path has just been said."""
+    emit(log, _PHASE, iteration, _PLAN, _SOLVED, 0, 0.0, log.q, 0)

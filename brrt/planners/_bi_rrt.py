@@ -10,20 +10,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Source
+from brrt.events import Kind, Reason, Source, Stage
 from brrt.kernels.emit import Buffer, emit, room
-from brrt.kernels.forest import Forest, add, fits
+from brrt.kernels.forest import Forest, add, emit_path, emit_roots, emit_solved, fits
 from brrt.kernels.jit import inlined, kernel
 from brrt.kernels.kdtree import nearest
+from brrt.kernels.random import Random, uniform
 from brrt.kernels.space import sample_uniform, segment_free, steer
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, SOLVED, STATE_FULL
+from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, POINTS, SOLVED, STATE_FULL
 
 Floats = NDArray[np.float64]
 
 REJECT, SAMPLE, CONNECT = int(Kind.REJECT), int(Kind.SAMPLE), int(Kind.CONNECT)
 UNIFORM, OTHER_TREE = int(Source.UNIFORM), int(Source.OTHER_TREE)
 COLLISION, NO_PROGRESS = int(Reason.COLLISION), int(Reason.NO_PROGRESS)
-LINK_BLOCKED = int(Reason.LINK_BLOCKED)
+LINK_BLOCKED, RAW = int(Reason.LINK_BLOCKED), int(Stage.RAW)
 
 ALTERNATE, SMALLER, COIN = range(3)
 """Whose turn it is; see `BiRRT.turn`."""
@@ -34,8 +35,9 @@ extended, the node that its next extension leaves from or -1 while that is to be
 this iteration added a node, and from here on the newest node of each tree (two places)."""
 COUNTS = NEWEST + 2
 
-_DRAW, _GROW, _LINK = range(3)
-"""Stages: draw a sample, grow towards it, link the other tree to what has grown."""
+_BEGIN, _DRAW, _GROW, _LINK, _DONE = range(5)
+"""Stages: say where the trees begin, draw a sample, grow towards it, link the other tree to what
+has grown, say what the path is."""
 
 _TARGET, _NEW = range(2)
 """Rows of `Trees.scratch`: what an extension heads for, and the new node."""
@@ -68,13 +70,13 @@ class Trees(NamedTuple):
 
 
 @inlined
-def draw(trees: Trees, space: Any, rng: np.random.Generator, log: Buffer, options: Options) -> int:
+def draw(trees: Trees, space: Any, rng: Random, log: Buffer, options: Options) -> int:
     """Choose a tree and what it heads for; return the stage that begins."""
     counts, sizes = trees.counts, trees.forest.nodes
     counts[DRAWS] += 1
     counts[FROM], counts[GREW] = -1, 0
     stage, source = _GROW, UNIFORM
-    if options.turn == COIN and rng.random() < 0.5:
+    if options.turn == COIN and uniform(rng) < 0.5:
         stage, source = _LINK, OTHER_TREE
     elif options.turn == SMALLER and sizes[1] != sizes[2]:
         counts[TURN] = 0 if sizes[1] < sizes[2] else 1
@@ -112,7 +114,7 @@ def connect(trees: Trees, log: Buffer, tree: int, node: int, far: float) -> None
 def iterate(
     trees: Trees,
     space: Any,
-    rng: np.random.Generator,
+    rng: Random,
     log: Buffer,
     options: Options,
     limit: int,
@@ -120,7 +122,18 @@ def iterate(
 ) -> int:
     """One call of `advance`."""
     forest, counts, scratch = trees.forest, trees.counts, trees.scratch
+    if counts[STAGE] == _BEGIN:
+        emit_roots(forest, log)
+        counts[STAGE] = _DRAW
     while True:
+        if counts[STAGE] == _DONE:
+            start, goal = counts[NEWEST], counts[NEWEST + 1]
+            cost = trees.cost[0]
+            counts[POINTS] = emit_path(forest, log, counts[DRAWS], RAW, cost, start, goal)
+            if counts[POINTS] > 0:
+                return BATCH_FULL
+            emit_solved(log, counts[DRAWS])
+            return SOLVED
         if room(log) < 2:
             return BATCH_FULL
         if not fits(forest, 1):
@@ -148,7 +161,8 @@ def iterate(
             emit(log, REJECT, counts[DRAWS], tree, number, reason, 0.0, scratch, _NEW)
         elif linking and reached:
             connect(trees, log, tree, near, far)
-            return SOLVED
+            counts[STAGE] = _DONE
+            continue
         else:
             node = add(forest, space, log, counts[DRAWS], tree, near, scratch, _NEW)
             counts[NEWEST + tree] = counts[FROM] = node
@@ -168,7 +182,7 @@ def iterate(
 def advance(
     trees: Trees,
     space: Any,
-    rng: np.random.Generator,
+    rng: Random,
     log: Buffer,
     options: Options,
     limit: int,

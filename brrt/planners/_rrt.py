@@ -5,13 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Source
+from brrt.events import Kind, Reason, Source, Stage
 from brrt.kernels.emit import Buffer, emit, room
-from brrt.kernels.forest import Forest, add, fits
+from brrt.kernels.forest import Forest, add, emit_path, emit_roots, emit_solved, fits
 from brrt.kernels.jit import inlined, kernel
 from brrt.kernels.kdtree import nearest
+from brrt.kernels.random import Random, uniform
 from brrt.kernels.space import distance, interpolate, sample_uniform, segment_free, steer
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, SOLVED, STATE_FULL
+from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, POINTS, SOLVED, STATE_FULL
 
 Floats = NDArray[np.float64]
 
@@ -19,11 +20,11 @@ REJECT, SAMPLE = int(Kind.REJECT), int(Kind.SAMPLE)
 UNIFORM, GOAL = int(Source.UNIFORM), int(Source.GOAL)
 COLLISION, NO_PROGRESS = int(Reason.COLLISION), int(Reason.NO_PROGRESS)
 GOAL_BLOCKED = int(Reason.GOAL_BLOCKED)
-START_TREE = 0
+START_TREE, RAW = 0, int(Stage.RAW)
 
-UNTESTED, GOAL_NODE = OWN, OWN + 1
-"""Places in `Tree.counts` of the newest node while it is not yet tested for the goal or -1, and of
-the node at the goal or -1."""
+BEGUN, UNTESTED, GOAL_NODE, COUNTS = range(OWN, OWN + 4)
+"""Places in `Tree.counts` of whether the root has been said, the newest node while it is not yet
+tested for the goal or -1, and the node at the goal or -1; and how many places there are."""
 
 _DRAWN, _NEW, _TARGET = range(3)
 """Rows of `Tree.scratch`: the sample, the new node, the goal."""
@@ -44,7 +45,7 @@ class Tree(NamedTuple):
 
     Attributes:
         forest: The tree.
-        counts: See `drive` and above, shape (5,).
+        counts: See `drive` and above, shape (COUNTS,).
         scratch: The sample, the new node and the goal, shape (3, dof).
     """
 
@@ -99,35 +100,45 @@ def reach_goal(tree: Tree, space: Any, log: Buffer, node: int, options: Options)
 def iterate(
     tree: Tree,
     space: Any,
-    rng: np.random.Generator,
+    rng: Random,
     log: Buffer,
     options: Options,
     limit: int,
     draw_limit: int,
 ) -> int:
     """One call of `advance`."""
-    counts, scratch = tree.counts, tree.scratch
+    counts, scratch, forest = tree.counts, tree.scratch, tree.forest
     newest = counts[UNTESTED]
+    if not counts[BEGUN]:
+        counts[BEGUN] = 1
+        emit_roots(forest, log)
     while True:
+        if counts[GOAL_NODE] >= 0:
+            goal = counts[GOAL_NODE]
+            counts[POINTS] = emit_path(forest, log, counts[DRAWS], RAW, forest.cost[goal], goal, -1)
+            if counts[POINTS] > 0:
+                return BATCH_FULL
+            emit_solved(log, counts[DRAWS])
+            return SOLVED
         if room(log) < options.slices + 3:
             return BATCH_FULL
-        if not fits(tree.forest, options.slices + 1):
+        if not fits(forest, options.slices + 1):
             return STATE_FULL
         if newest >= 0:
             counts[UNTESTED] = -1
             if reach_goal(tree, space, log, newest, options):
-                return SOLVED
+                continue
         if counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit:
             return LIMIT
         counts[DRAWS] += 1
-        source = GOAL if rng.random() < options.goal_bias else UNIFORM
+        source = GOAL if uniform(rng) < options.goal_bias else UNIFORM
         if source == GOAL:
             for k in range(len(space.lower)):
                 scratch[_DRAWN, k] = scratch[_TARGET, k]
         else:
             sample_uniform(space, rng, scratch, _DRAWN)
         emit(log, SAMPLE, counts[DRAWS], START_TREE, source, 0, 0.0, scratch, _DRAWN)
-        near = nearest(tree.forest.neighbours, space, scratch, _DRAWN, START_TREE)
+        near = nearest(forest.neighbours, space, scratch, _DRAWN, START_TREE)
         newest = extend(tree, space, log, near, options)
         counts[UNTESTED] = newest
         if newest >= 0 or options.count_failed:
@@ -138,7 +149,7 @@ def iterate(
 def advance(
     tree: Tree,
     space: Any,
-    rng: np.random.Generator,
+    rng: Random,
     log: Buffer,
     options: Options,
     limit: int,

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.events import Events
 from brrt.kernels.emit import EventLog
-from brrt.kernels.forest import RESERVED_NODES, grown_forest, joined, rooted_forest
+from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
 from brrt.planners import _bi_rrt
 from brrt.planners.contract import Contract
 from brrt.planners.drive import Loop, drive
@@ -84,14 +83,9 @@ def solve(
     trees = _bi_rrt.Trees(
         rooted_forest(roots, RESERVED_NODES), counts, np.zeros(1), scratch=roots.copy()
     )
-    loop = Loop(_bi_rrt.advance, trees, options, _grown, _path, 4, stop.iterations)
-    return drive(loop, roots, problem, rng, log, stop)
+    loop = Loop(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
+    return drive(loop, problem, rng, log, stop)
 
 
 def _grown(trees: _bi_rrt.Trees) -> _bi_rrt.Trees:
     return trees._replace(forest=grown_forest(trees.forest))
-
-
-def _path(trees: _bi_rrt.Trees) -> tuple[NDArray[np.float64], float]:
-    start, goal = (int(node) for node in trees.counts[_bi_rrt.NEWEST :])
-    return trees.forest.q[joined(trees.forest, start, goal)], float(trees.cost[0])

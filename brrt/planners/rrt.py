@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.events import Events
 from brrt.kernels.emit import EventLog
-from brrt.kernels.forest import grown_forest, lineage, rooted_forest
+from brrt.kernels.forest import grown_forest, rooted_forest
 from brrt.planners import _rrt
 from brrt.planners.contract import Contract
 from brrt.planners.drive import Loop, drive
@@ -62,20 +61,16 @@ class RRT(Planner):
         roots = problem.start[None]
         tree = _rrt.Tree(
             forest=rooted_forest(roots, 2 + (stop.iterations + 1) * options.slices),
-            counts=np.array([0, 0, 0, 0, -1]),
+            counts=np.zeros(_rrt.COUNTS, np.int64),
             scratch=np.array([problem.start, problem.start, problem.goal]),
         )
+        tree.counts[_rrt.GOAL_NODE] = -1
         draws = 1 if self.count_failed else _DRAWS_PER_ITERATION
         loop = Loop(
-            _rrt.advance, tree, options, _grown, _path, options.slices + 4, draws * stop.iterations
+            _rrt.advance, tree, options, _grown, options.slices + 4, draws * stop.iterations
         )
-        yield from drive(loop, roots, problem, rng, log, stop)
+        return drive(loop, problem, rng, log, stop)
 
 
 def _grown(tree: _rrt.Tree) -> _rrt.Tree:
     return tree._replace(forest=grown_forest(tree.forest))
-
-
-def _path(tree: _rrt.Tree) -> tuple[NDArray[np.float64], float]:
-    forest, goal = tree.forest, int(tree.counts[_rrt.GOAL_NODE])
-    return forest.q[lineage(forest, goal)], float(forest.cost[goal])
