@@ -60,7 +60,7 @@ def kernel(fn: F) -> F:
     Nopython mode with IEEE semantics, without the GIL, cached on disk. No fastmath: the same seed
     gives the same bits on every machine.
     """
-    return _compiled(fn, {})
+    return _compiled(fn, {"_nrt": False})
 
 
 def prepared(fn: F, *args: Any) -> F:

@@ -360,8 +360,8 @@ def grown(star: Star, space: Any, options: Options, node: int) -> int:
     return _TELL
 
 
-@inlined
-def iterate(
+@kernel
+def advance(
     star: Star,
     space: Any,
     rng: Random,
@@ -370,7 +370,7 @@ def iterate(
     limit: int,
     draw_limit: int,
 ) -> int:
-    """One call of `advance`."""
+    """Run until done, out of room, or until `limit` iterations or `draw_limit` draws are made."""
     counts = star.counts
     if counts[STAGE] == _BEGIN:
         emit_roots(star.forest, log)
@@ -400,17 +400,3 @@ def iterate(
         if counts[STAGE] == _LINK:
             link(star, space, log, options)
         counts[STAGE] = stage
-
-
-@kernel
-def advance(
-    star: Star,
-    space: Any,
-    rng: Random,
-    log: Buffer,
-    options: Options,
-    limit: int,
-    draw_limit: int,
-) -> int:
-    """Run until done, out of room, or until `limit` iterations or `draw_limit` draws are made."""
-    return iterate(star, space, rng, log, options, limit, draw_limit)
