@@ -142,7 +142,7 @@ def draw(star: Star, space: Any, rng: Random, log: Buffer, options: Options) -> 
 def radius(star: Star, space: Any, tree: int, options: Options) -> float:
     """Return the radius of the neighbourhood of a node that is about to join a tree."""
     n = star.forest.nodes[1 + tree] + 1.0
-    return min(options.step, options.gamma * (math.log(n) / n) ** (1.0 / len(space.lower)))
+    return float(min(options.step, options.gamma * (math.log(n) / n) ** (1.0 / len(space.lower))))
 
 
 @inlined
