@@ -40,7 +40,8 @@ def iterate(
         counts[LAST] = 0
         begin(search, lattice, 0)
     while True:
-        if room(log) < len(lattice.deltas) + 1:
+        # Room for a cell and its neighbours, and for the path and the end after them.
+        if room(log) < len(lattice.deltas) + 3:
             return BATCH_FULL
         if not lattice_has_room(lattice) or not search_has_room(search, lattice):
             return TABLE_FULL

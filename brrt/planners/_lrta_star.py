@@ -34,7 +34,7 @@ Ints = NDArray[np.int32]
 
 HEURISTIC, MOVE = int(Kind.HEURISTIC), int(Kind.MOVE)
 
-BATCH_FULL, TABLE_FULL, LIMIT, ARRIVED, NO_PATH = range(5)
+BATCH_FULL, TABLE_FULL, TRACE_FULL, LIMIT, ARRIVED, NO_PATH = range(6)
 """Why `advance` returned."""
 
 CELL, MOVES, TRIAL, STEP, STAGE, CLOSED, NEXT, END, LAST_LEG = range(9)
@@ -165,7 +165,7 @@ def learn(walk: Walk, search: Search, lattice: Lattice, log: Buffer) -> None:
 
 
 @inlined
-def go(walk: Walk, lattice: Lattice, space: Any, log: Buffer) -> None:
+def go(walk: Walk, lattice: Lattice, log: Buffer) -> None:
     """Make the next move of the plan."""
     counts = walk.counts
     cell, target = int(counts[CELL]), int(walk.plan[counts[NEXT]])
@@ -205,8 +205,9 @@ def iterate(
     counts = walk.counts
     enter_cells(lattice)
     while True:
-        # Room for what any part below may say, so that none has to stop half-way.
-        if room(log) < max(len(lattice.deltas) + 2, lookahead):
+        # Room for what any part below may say, so that none has to stop half-way, and for the
+        # path and the end after it.
+        if room(log) < max(len(lattice.deltas), lookahead) + 4:
             return BATCH_FULL
         if counts[STAGE] == GO:
             if counts[NEXT] == counts[END]:
@@ -218,8 +219,8 @@ def iterate(
             if counts[MOVES] >= limit:
                 return LIMIT
             if counts[STEP] + 1 >= len(walk.trace):
-                return TABLE_FULL
-            go(walk, lattice, space, log)
+                return TRACE_FULL
+            go(walk, lattice, log)
         elif counts[STAGE] == LEARN:
             learn(walk, search, lattice, log)
             counts[STAGE] = GO

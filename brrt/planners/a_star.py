@@ -59,9 +59,7 @@ class LatticePlanner(Planner):
         sides = (problem.world.upper - problem.world.lower) / self.epsilon + 1
         room = 32 + int(min(float(sides.prod()), _FIRST_ROOM))
         ends = problem.start, problem.goal
-        return rooted_lattice(
-            *ends, self.epsilon, self.max_move, room, diagonals=self.diagonals
-        )
+        return rooted_lattice(*ends, self.epsilon, self.max_move, room, diagonals=self.diagonals)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +110,6 @@ class AStar(LatticePlanner):
             else:
                 status = due
         iteration = int(counts[_a_star.EXPANSIONS])
-        if log.room < 2:
-            yield log.drain()
         if status is Status.SOLVED:
             last = int(counts[_a_star.LAST])
             cost, cells = _path(search, last)

@@ -73,23 +73,19 @@ class LRTAStar(LatticePlanner):
                 yield log.drain()
             elif result == _lrta_star.TABLE_FULL:
                 lattice, search = grown_lattice(lattice), grown_search(search)
-                walk = _grown_walk(walk, len(lattice.keys))
+                walk = walk._replace(learnt=np.empty(len(lattice.keys)))
+            elif result == _lrta_star.TRACE_FULL:
+                walk = walk._replace(trace=np.resize(walk.trace, 2 * len(walk.trace)))
             elif result == _lrta_star.ARRIVED:
-                if log.room < 2:
-                    yield log.drain()
                 _report_trial(walk, lattice, log)
-                counts[_lrta_star.TRIAL] += 1
-                if counts[_lrta_star.TRIAL] == self.trials:
-                    status = Status.SOLVED
                 _return_to_start(walk)
+                status = Status.SOLVED if counts[_lrta_star.TRIAL] == self.trials else None
             elif result == _lrta_star.NO_PATH:
                 status = Status.NO_PATH
             elif due is None and counts[_lrta_star.MOVES] >= most:
                 status = Status.ITERATION_LIMIT
             else:
                 status = due
-        if not log.room:
-            yield log.drain()
         log.emit(Kind.PHASE, int(counts[_lrta_star.MOVES]), name=Phase.PLAN, status=status)
         yield log.drain()
 
@@ -103,13 +99,6 @@ class LRTAStar(LatticePlanner):
             length=np.zeros(1),
             counts=np.zeros(9, np.int64),
         )
-
-
-def _grown_walk(walk: _lrta_star.Walk, capacity: int) -> _lrta_star.Walk:
-    """Return the same walk with twice the room for moves, and room for so many cells."""
-    trace = np.zeros(2 * len(walk.trace), np.int32)
-    trace[: len(walk.trace)] = walk.trace
-    return walk._replace(trace=trace, learnt=np.empty(capacity))
 
 
 def _report_trial(walk: _lrta_star.Walk, lattice: Lattice, log: EventLog) -> None:
@@ -129,5 +118,7 @@ def _report_trial(walk: _lrta_star.Walk, lattice: Lattice, log: EventLog) -> Non
 
 
 def _return_to_start(walk: _lrta_star.Walk) -> None:
+    """Begin the next trial."""
+    walk.counts[_lrta_star.TRIAL] += 1
     walk.counts[[_lrta_star.CELL, _lrta_star.STEP, _lrta_star.LAST_LEG]] = 0
     walk.length[0] = 0.0
