@@ -1,18 +1,19 @@
 """What LRTA* and A* promise on a lattice, proven from their events alone and by slow twins."""
 
+import hashlib
 import json
 import math
 import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -27,8 +28,7 @@ from brrt.problem import Problem
 from brrt.robots import Point
 from brrt.run import Run
 from brrt.scenario import Scenario
-from brrt.settings import Settings
-from brrt.worlds import World
+from brrt.worlds import World, make_world
 
 from . import naive
 from .conftest import Result
@@ -97,13 +97,11 @@ def problems(draw: st.DrawFn, most: int = 7) -> Problem:
     ends = [[0.5] * dim, [side - 0.5] * dim]
     if draw(st.booleans()):
         ends = (rng.random((2, dim)) * side).tolist()
-    free = [q for q in ends if world.obstacle_at(q) is None]
-    grid = [q for q in np.argwhere(np.ones((side,) * dim)) + 0.5 if world.obstacle_at(q) is None]
-    free += [q.tolist() for q in grid] or [None]
-    start, goal = free[0], free[min(1, len(free) - 1)]
-    if start is None or goal is None:
-        start, goal, world = ends[0], ends[1], World("empty", world.lower, world.upper)
-    return Problem(world, Point(), np.array(start), np.array(goal))
+    centres = (np.argwhere(np.ones((side,) * dim)) + 0.5).tolist()
+    free = [q for q in ends + centres if world.obstacle_at(q) is None]
+    if not free:
+        free, world = ends, World("empty", world.lower, world.upper)
+    return Problem(world, Point(), np.array(free[0]), np.array(free[min(1, len(free) - 1)]))
 
 
 LATTICES = st.fixed_dictionaries(
@@ -265,7 +263,7 @@ def check_beginning(part: Events, whole: Events) -> None:
 
 
 @pytest.mark.parametrize("planner", [LRTAStar(lookahead=3, trials=2), LRTAStar(), AStar()])
-def test_time_ends_a_run(planner: Planner, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_ends_a_run(planner: AStar | LRTAStar) -> None:
     """A search on 10^12 cells that cannot reach the goal ends when its time is up."""
     boxes = np.array([[6.0, -1.0, 6.5, 11.0]])
     world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=boxes)
@@ -304,7 +302,7 @@ def test_start_is_the_goal(planner: Planner) -> None:
 
 
 @pytest.mark.parametrize("planner", [LRTAStar(lookahead=5), LRTAStar(), AStar()])
-def test_walled_in(planner: Planner) -> None:
+def test_walled_in(planner: AStar | LRTAStar) -> None:
     """A start without free neighbours is hopeless at once, and so is a closed room later."""
     walls = [[3.0, 3, 7, 4], [3, 6, 7, 7], [3, 3, 4, 7], [6, 3, 7, 7]]
     world = World("room", np.zeros(2), np.full(2, 10.0), boxes=np.array(walls))
@@ -317,20 +315,18 @@ def test_walled_in(planner: Planner) -> None:
         assert np.isfinite(events[Kind.HEURISTIC]["h"]).all()
 
 
-@dataclass(frozen=True, slots=True)
-class Turtle(Settings):
+class Turtle:
     """Some other robot."""
 
-    point: Point = field(default_factory=Point)
     dof, space, collision = Point.dof, Point.space, Point.collision
 
 
 @pytest.mark.parametrize("planner", [LRTAStar(), AStar()])
-def test_refuses_what_it_cannot_plan_for(planner: Planner) -> None:
+def test_refuses_what_it_cannot_plan_for(planner: AStar | LRTAStar) -> None:
     """Another robot, and cells that are too small, are refused in a line before any event."""
     world = World("empty", np.zeros(2), np.full(2, 10.0))
     ends = np.array([1.0, 1.0]), np.array([9.0, 9.0])
-    turtle: Any = Turtle.__new__(Turtle)
+    turtle: Any = Turtle()
     with pytest.raises(BrrtError, match=r"move a point; use --robot point"):
         planned(planner, Problem(world, turtle, *ends))
     with pytest.raises(BrrtError, match=r"epsilon 1e-09 is too small for this world"):
@@ -412,23 +408,13 @@ def test_movingai_optima(path: Path) -> None:
         pytest.skip("no grid maps here")
     planner = AStar(epsilon=1.0, diagonals=True)
     name = path.name.removesuffix(".scen").split("-even")[0].removesuffix(".map") + ".map"
-    world = Scenario(world=str(GRIDS / name), start=(0.5, 0.5), goal=(0.5, 0.5))
-    made = None
+    world = make_world(str(GRIDS / name))
     for start, goal, length in scenarios(path.name):
-        made = made or load(world.world)
-        events = planned(planner, Problem(made, Point(), start, goal))
+        events = planned(planner, Problem(world, Point(), start, goal))
         assert events[Kind.PATH]["cost"].tolist() == [pytest.approx(length, abs=1e-3)]
 
 
-def load(spec: str) -> World:
-    """Read a map."""
-    from brrt.worlds import make_world
-
-    return make_world(spec)
-
-
 PLAIN = """
-import sys
 from tests.test_lattice import digest
 print(digest())
 """
@@ -436,8 +422,6 @@ print(digest())
 
 def digest() -> str:
     """Digest of every event of some runs."""
-    import hashlib
-
     world = World("walled", np.zeros(3), np.full(3, 5.0), boxes=np.array([[2.0, 0, 0, 3, 4, 5]]))
     problem = Problem(world, Point(), np.array([1.0, 1, 1]), np.array([4.0, 1, 1]))
     total = hashlib.sha256()
