@@ -3,10 +3,10 @@
     python benchmarks/lattice.py [--maps FOLDER] [--runs 5]
 
 FOLDER holds course maps in the boundary/block format and their queries.json; without it LRTA*
-walks 200 times through a generated 3D world. Each run writes an MCAP file in a temporary folder. The first figure
-is the time spent in kernels, by the events' own stamps, from the first to the last of each batch;
-the second is the time of planning as a user sees it, waits for the recorder included, which needs
-a core of its own. Both are the best of the runs, on loaded kernels.
+walks 200 times through a generated 3D world. Each run writes an MCAP file in a temporary folder.
+The first time is that in kernels, by the events' own stamps, from the first to the last of each
+batch; the second is that of planning as a user sees it, waits for the recorder included, which
+needs a core of its own. Both are the best of the runs, on loaded kernels.
 """
 
 import argparse
