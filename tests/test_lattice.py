@@ -207,16 +207,28 @@ def test_lrta_star_keeps_its_promises(
 def test_trials_converge_to_the_shortest_path(
     problem: Problem, options: dict[str, Any], lookahead: int
 ) -> None:
-    """With what was learnt kept, the robot comes to walk as A* plans."""
+    """With what was learnt kept, the robot comes to walk as A* plans.
+
+    How many trials that takes nobody can say; but once a trial teaches nothing, it and all that
+    follow are shortest, and that comes in the end.
+    """
     best = planned(AStar(**options), problem)[Kind.PATH]["cost"]
-    planner = LRTAStar(**options, lookahead=lookahead, trials=400)
-    events = planned(planner, problem, stop=Stop(iterations=10**7))
-    if len(best):
+    for trials in (200, 2_000, 20_000):
+        planner = LRTAStar(**options, lookahead=lookahead, trials=trials)
+        events = planned(planner, problem, stop=Stop(iterations=10**8))
+        if not len(best):
+            assert status(events) is Status.NO_PATH
+            return
         assert status(events) is Status.SOLVED
-        assert len(events[Kind.PATH]) == 400
-        assert events[Kind.PATH]["cost"][-1] == pytest.approx(best[0], rel=1e-9)
-    else:
-        assert status(events) is Status.NO_PATH
+        costs = events[Kind.PATH]["cost"]
+        assert len(costs) == trials
+        assert costs.min() >= best[0] * (1 - 1e-9)
+        trial = np.searchsorted(events[Kind.PATH]["seq"], events[Kind.HEURISTIC]["seq"])
+        settled = int(np.setdiff1d(np.arange(trials), trial).min(initial=trials))
+        np.testing.assert_allclose(costs[settled:], best[0], rtol=1e-9)
+        if settled < trials:
+            return
+    raise AssertionError("it goes on learning")
 
 
 @SOME
