@@ -203,12 +203,10 @@ def _hits_hull(
     return True
 
 
-def _hits_polygon(
-    o: Obstacles, polygon: int, ax: float, ay: float, dx: float, dy: float
-) -> bool:
+def _hits_polygon(o: Obstacles, polygon: int, line: tuple[float, float, float, float]) -> bool:
     """Whether the segment from (ax, ay) along (dx, dy) touches a polygon of a 2D world."""
-    first, end = o.corners[polygon], o.corners[polygon + 1]
-    return _hits_hull(o.vertices, first, end, ax, ay, dx, dy)
+    ax, ay, dx, dy = line
+    return _hits_hull(o.vertices, o.corners[polygon], o.corners[polygon + 1], ax, ay, dx, dy)
 
 
 @overload(_hits_polygon, strict=False, jit_options=BORROWING)  # type: ignore[arg-type]
@@ -217,9 +215,7 @@ def _by_dimension(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types ar
     if len(o.types[0]) == 2:
         return _hits_polygon
 
-    def never(
-        o: Obstacles, polygon: int, ax: float, ay: float, dx: float, dy: float  # noqa: ARG001
-    ) -> bool:
+    def never(o: Any, polygon: Any, line: Any) -> bool:  # noqa: ARG001
         return False
 
     return never
@@ -291,7 +287,7 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
                     enter, leave = max(enter, low), min(leave, high)
                 if max(enter, 0.0) <= min(leave, 1.0) + _SLACK:
                     return True
-            elif _hits_polygon(o, item - n_round_or_box, ax, ay, dx, dy):
+            elif _hits_polygon(o, item - n_round_or_box, (ax, ay, dx, dy)):
                 return True
         if next_x <= next_y and next_x <= next_z:
             if next_x > 1.0:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
+from brrt.settings import pairs
 from brrt.worlds.blocks import load_blocks
 from brrt.worlds.generators import (
     Boxes2D,
@@ -57,7 +58,7 @@ def make_world(
     """
     name, _, rest = spec.partition(":")
     if name in GENERATORS:
-        settings = GENERATORS[name].parse(f"world {name}", _pairs(spec, rest))
+        settings = GENERATORS[name].parse(f"world {name}", pairs(f"world {spec}", rest))
         return settings.make(spec, start, goal, room)
     path = Path(spec)
     if not spec:
@@ -97,16 +98,6 @@ def load_world(path: Path) -> World:
 
 def _named(name: str, world: World) -> World:
     return replace(world, name=name)
-
-
-def _pairs(spec: str, text: str) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for part in filter(None, text.split(",")):
-        key, equals, value = part.partition("=")
-        if not equals:
-            raise BrrtError(f"world {spec}: {part!r} must read name=value")
-        pairs[key.strip()] = value.strip()
-    return pairs
 
 
 __all__ = ["GENERATORS", "LOADERS", "Generator", "World", "load_world", "make_world"]

@@ -33,7 +33,7 @@ class Generator(Settings):
 
     @abstractmethod
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
-        """Draw n obstacles: centres, shape (n, d), and half extents or whatever says their shape."""
+        """Draw n obstacles: centres, shape (n, d), and half extents, or whatever is their shape."""
 
     @abstractmethod
     def covers(
@@ -245,7 +245,5 @@ class Polygons2D(Generator):
         polygons = []
         for centre, (radius, corners, *angles) in zip(centres, halves, strict=True):
             around = np.array(angles[: int(corners)])
-            polygons.append(
-                centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1)
-            )
+            polygons.append(centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1))
         return self._world(name, ends, polygons=tuple(polygons))
