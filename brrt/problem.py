@@ -38,6 +38,7 @@ class Problem:
     def __post_init__(self) -> None:
         """Check start and goal."""
         object.__setattr__(self, "robot", self.robot.settled(self.world))
+        object.__setattr__(self, "space", self.robot.space(self.world))
         for name in ("start", "goal"):
             q = np.array(getattr(self, name), dtype=np.float64).reshape(-1)
             text = ",".join(f"{x:g}" for x in q)
@@ -53,13 +54,12 @@ class Problem:
             why = self.robot.collision(self.world, q)
             if why is not None:
                 lower, upper = (
-                    ",".join(f"{x:g}" for x in b) for b in (self.world.lower, self.world.upper)
+                    ",".join(f"{x:g}" for x in b) for b in (self.space.lower, self.space.upper)
                 )
                 raise BrrtError(
                     f"{name} {text} {why}; choose a free one between {lower} and {upper}"
                 )
             object.__setattr__(self, name, q)
-        object.__setattr__(self, "space", self.robot.space(self.world))
 
     @property
     def dof(self) -> int:

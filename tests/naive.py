@@ -56,11 +56,37 @@ def segment_hits_ball(a: Point, b: Point, ball: Point, margin: float = 0.0) -> b
     return sum(x * x for x in gap) <= (radius + Fraction(margin)) ** 2
 
 
+def segment_hits_polygon(a: Point, b: Point, polygon: Floats) -> bool:
+    """Whether the closed segment a b touches a closed polygon: an edge, or from within."""
+    p, q, corners = exact(a), exact(b), [exact(corner) for corner in polygon]
+    edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
+    if any(_segments_meet(p, q, u, v) for u, v in edges):
+        return True
+    return len(corners) > 2 and all(_left_of(u, v, p) >= 0 for u, v in edges)
+
+
+def _left_of(u: list[Fraction], v: list[Fraction], p: list[Fraction]) -> Fraction:
+    return (v[0] - u[0]) * (p[1] - u[1]) - (v[1] - u[1]) * (p[0] - u[0])
+
+
+def _segments_meet(
+    p: list[Fraction], q: list[Fraction], u: list[Fraction], v: list[Fraction]
+) -> bool:
+    """Whether the boxes around two segments meet, and each has the other's ends on both sides."""
+    for k in range(2):
+        if max(p[k], q[k]) < min(u[k], v[k]) or max(u[k], v[k]) < min(p[k], q[k]):
+            return False
+    across = _left_of(p, q, u) * _left_of(p, q, v) <= 0
+    return across and _left_of(u, v, p) * _left_of(u, v, q) <= 0
+
+
 def hits(world: World, a: Point, b: Point) -> bool:
     """Whether the closed segment a b touches an obstacle."""
     boxes, balls = _close_to(world, a, b)
-    return any(segment_hits_box(a, b, box) for box in boxes) or any(
-        segment_hits_ball(a, b, ball) for ball in balls
+    return (
+        any(segment_hits_box(a, b, box) for box in boxes)
+        or any(segment_hits_ball(a, b, ball) for ball in balls)
+        or any(segment_hits_polygon(a, b, polygon) for polygon in world.polygons)
     )
 
 
@@ -76,6 +102,10 @@ def nearly_hits(world: World, a: Point, b: Point) -> bool:
     for ball in world.balls:
         around = [*ends, ball[:d] - ball[d], ball[:d] + ball[d]]
         if segment_hits_ball(a, b, ball, NEAR * np.ptp(around, axis=0).max()):
+            return True
+    for polygon in world.polygons:
+        near = NEAR * np.ptp([*ends, *polygon], axis=0).max()
+        if hull_distance(ends[None], polygon[None])[0] <= near:
             return True
     return False
 
