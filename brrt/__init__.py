@@ -16,7 +16,7 @@ from brrt.recording import McapSink, Memory, Recording, read
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
-from brrt.robots import ROBOTS, Point
+from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds import GENERATORS, World, make_world
@@ -27,6 +27,7 @@ __all__ = [
     "ROBOTS",
     "RRT",
     "BrrtError",
+    "Chain",
     "Difference",
     "Events",
     "Kind",
@@ -36,9 +37,11 @@ __all__ = [
     "Metrics",
     "Planner",
     "Point",
+    "Polygon",
     "Problem",
     "Recording",
     "RecordingError",
+    "Robot",
     "Run",
     "Scenario",
     "Sink",
@@ -46,6 +49,7 @@ __all__ = [
     "World",
     "first_difference",
     "forest",
+    "make_robot",
     "make_world",
     "read",
 ]
