@@ -97,9 +97,7 @@ class Paths:
         path, robot = event["waypoints"], self._canvas.robot
         if not robot.outline(path[0]):
             return
-        far = np.cumsum(
-            [0, *(float(robot.distance(a, b)) for a, b in pairwise(path))]
-        )
+        far = np.cumsum([0, *(float(robot.distance(a, b)) for a, b in pairwise(path))])
         bodies = []
         for way in np.linspace(0, far[-1], _GHOSTS + 2)[1:-1]:
             i = min(int(np.searchsorted(far, way, "right")), len(path) - 1) - 1
