@@ -50,6 +50,17 @@ class Canvas:
         """Log what holds at all times."""
         self._rec.log(entity, archetype, static=True)
 
+    def row_style(
+        self, archetype: Any, rows: int, radius: float, layer: float, colour: int | None = None
+    ) -> Any:
+        """Return a style for each of some rows, for entities that share theirs with many."""
+        given: dict[str, Any] = {"radii": np.full(rows, radius, np.float32)}
+        if colour is not None:
+            given["colors"] = np.full(rows, colour, np.uint32)
+        if self.dim == 2:
+            given["draw_order"] = np.full(rows, layer, np.float32)
+        return archetype.columns(**given)
+
     def plot_style(self, entity: str, name: str, colour: scene.Colour) -> None:
         """Name and colour a plot."""
         line = rr.SeriesLines(names=name.replace("_", " "), colors=colour, widths=1.5)
@@ -72,9 +83,16 @@ class Canvas:
         """Send items in rows; each row has the time of its last event."""
         self.send_rows(entity, rows[ends - 1], np.diff(ends, prepend=0), columns)
 
-    def send_rows(self, entity: str, moments: Table, counts: NDArray[Any], columns: Any) -> None:
-        """Send so many items at each of some moments."""
-        parts = columns.partition(counts)
+    def send_rows(
+        self,
+        entity: str,
+        moments: Table,
+        counts: NDArray[Any],
+        columns: Any,
+        style: Any = (),
+    ) -> None:
+        """Send so many items at each of some moments, and a style in each row if there is one."""
+        parts = [*columns.partition(counts), *style]
         self._rec.send_columns(entity, time_columns(moments), parts)
 
     def put_away(self, entity: str, event: Any, place: NDArray[np.float32]) -> None:

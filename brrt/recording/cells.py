@@ -15,6 +15,9 @@ from brrt.scenario import Manifest
 _IN_PLANE, _IN_SPACE = 0.42, 0.16
 """Radius of a cell's dot in edges of a cell; small in 3D, where one has to look through."""
 
+_WAY = 0.06
+"""Radius of the line between two cells, likewise."""
+
 
 class Cells:
     """Draws cells.
@@ -32,6 +35,7 @@ class Cells:
         self._canvas, self._sketches = canvas, sketches
         settings = manifest.scenario.make_planner().as_dict()
         self._edge, self._learns = float(settings.get("epsilon", 0.0)), "lookahead" in settings
+        self._radius = self._edge * (_IN_PLANE if canvas.dim == 2 else _IN_SPACE)
         self._goal = np.array(manifest.goal)
         self._scale = float(canvas.robot.distance(np.array(manifest.start), self._goal)) or 1.0
         self._cells = Sketch(canvas.world)
@@ -63,15 +67,11 @@ class Cells:
         if self._learns:
             self._canvas.plot_style("/series/nodes/raises", "heuristic raises", scene.OTHER)
         else:
-            self._style(scene.CELLS_ENTITY)
-            tree = scene.tree_style(0)[1]
-            self._canvas.style(scene.SEARCH_ENTITY, self._canvas.lines, tree, -0.75, 20.0)
+            thin, colour = self._edge * _WAY, scene.tree_style(0)[1]
+            self._canvas.style(scene.SEARCH_ENTITY, self._canvas.lines, colour, thin, 20.0)
 
-    def _style(self, entity: str) -> None:
-        radius = self._edge * (_IN_PLANE if self._canvas.dim == 2 else _IN_SPACE)
-        order = {"draw_order": 5.0} if self._canvas.dim == 2 else {}
-        style = self._canvas.points.from_fields(radii=radius, **order)
-        self._canvas.still(entity, style)
+    def _style(self, rows: int) -> Any:
+        return self._canvas.row_style(self._canvas.points, rows, self._radius, 5.0)
 
     def _search(self, rows: Table) -> None:
         """Draw each cell where the search reached it, and the way that it came."""
@@ -81,7 +81,8 @@ class Cells:
             return
         ends = growing_rows(cells.drawn - len(drawn), len(drawn))
         items = self._items(canvas.places(drawn["q"]), drawn["cost"])
-        canvas.send(scene.CELLS_ENTITY, drawn, ends, self._dots(items))
+        counts, style = np.diff(ends, prepend=0), self._style(len(ends))
+        canvas.send_rows(scene.CELLS_ENTITY, drawn[ends - 1], counts, self._dots(items), style)
         ways = [cells.places(drawn["parent"]), items["place"]]
         lines = np.stack(ways, axis=1).reshape(-1, canvas.dim)
         canvas.send(scene.SEARCH_ENTITY, drawn, ends, canvas.strips(lines, 2))

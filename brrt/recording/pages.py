@@ -7,9 +7,11 @@ wherever the cursor goes. What that costs is bounded in three ways:
 - Changed pages are logged when `_PER_CHANGE` items a change have been saved up for the ones logged
   before, and, once there have been many changes, a fraction of that. So the rows stay in proportion
   to the events, and the picture lags behind by about 1 % of what it shows; less at first.
-- The rows of a page come in one chunk a batch, where compression finds that they hardly differ.
+- The rows of a page are sent together, at most some times a second: a chunk takes a kilobyte and
+  a quarter of a millisecond, and within one compression finds that the rows hardly differ.
 """
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -22,8 +24,11 @@ from brrt.recording.canvas import MOMENT, Canvas, moments
 _MOST_PAGES, _FIRST_SIZE = 128, 32
 """Pages at most, and items on a page as long as that suffices."""
 
-_PER_CHANGE, _MANY_CHANGES, _PER_CHANGE_OF_MANY = 32, 100_000, 4
+_PER_CHANGE, _MANY_CHANGES, _PER_CHANGE_OF_MANY = 16, 100_000, 4
 """Items that may be logged for each change; and beyond so many changes."""
+
+_SEND_S = 0.5
+"""Seconds for which rows are gathered."""
 
 Items = NDArray[Any]
 Builder = Callable[[Items], Any]
@@ -37,7 +42,8 @@ class Pages:
         entity: The pages are entities below this one.
         columns: Turns items, one after the other, into what Rerun draws.
         empty: Items, shape (0,) and the type that they all have.
-        styled: Called with each page's entity before its first row.
+        style: Returns what all items share, for so many rows. It stands in each row, where it
+            compresses to nearly nothing; a chunk of its own for each page would take more.
     """
 
     def __init__(
@@ -46,12 +52,12 @@ class Pages:
         entity: str,
         columns: Builder,
         empty: Items,
-        styled: Callable[[str], None],
+        style: Callable[[int], Any],
     ) -> None:
-        self._canvas, self._entity, self._columns, self._styled = canvas, entity, columns, styled
+        self._canvas, self._entity, self._columns, self._style = canvas, entity, columns, style
         self._items, self._count, self._size = empty, 0, _FIRST_SIZE
         self._dirty = np.zeros(_MOST_PAGES, np.bool_)
-        self._known = np.zeros(_MOST_PAGES, np.bool_)
+        self._sent = time.monotonic()
         self._rows: dict[int, tuple[list[Any], list[Items]]] = {}
         self._changes, self._wait = 0, 1
         self._latest: Any = None
@@ -83,7 +89,8 @@ class Pages:
             if self._wait <= 0:
                 self._log()
             begin = end
-        self._send()
+        if time.monotonic() - self._sent > _SEND_S:
+            self._send()
 
     def close(self) -> None:
         """Log what is not logged yet."""
@@ -101,8 +108,7 @@ class Pages:
         if need > _MOST_PAGES * self._size:
             while need > _MOST_PAGES * self._size:
                 self._size *= 2
-            self._dirty |= self._known
-            self._dirty[: -(-need // self._size)] = True
+            self._dirty[:] = True  # those at the end are empty from now on
         self._dirty[slots // self._size] = True
 
     def _log(self) -> None:
@@ -121,10 +127,10 @@ class Pages:
     def _send(self) -> None:
         for page, (times, contents) in self._rows.items():
             entity = f"{self._entity}/{page:03d}"
-            if not self._known[page]:
-                self._known[page] = True
-                self._styled(entity)
             counts = np.array([len(content) for content in contents])
             columns = self._columns(np.concatenate(contents))
-            self._canvas.send_rows(entity, np.array(times, MOMENT), counts, columns)
+            self._canvas.send_rows(
+                entity, np.array(times, MOMENT), counts, columns, style=self._style(len(counts))
+            )
         self._rows.clear()
+        self._sent = time.monotonic()

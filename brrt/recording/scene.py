@@ -85,6 +85,12 @@ def path_style(stage: Stage) -> tuple[str, Colour, float]:
     return (stage.name.lower(), *_PATHS.get(stage, (OTHER, 2.0)))
 
 
+def packed(colour: Colour) -> int:
+    """Return a colour as Rerun packs it."""
+    red, green, blue = colour
+    return red << 24 | green << 16 | blue << 8 | 255
+
+
 def heat(values: NDArray[np.float64]) -> NDArray[np.uint32]:
     """Return colours for values from 0 to 1, as Rerun packs them, shape (n,)."""
     at = np.linspace(0, 1, len(_HEAT))

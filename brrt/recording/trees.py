@@ -83,7 +83,7 @@ class _Tree:
         self._drawn: list[NDArray[np.void]] = []
         self._root: NDArray[np.float32] | None = None
         self._pages: Pages | None = None
-        self._style(self._entity)
+        canvas.style(self._entity, canvas.lines, self._colour, -0.75, 20.0)
         canvas.plot_style(f"/series/nodes/{self._name}", f"{self._name} tree", self._colour)
 
     def draw(self, edges: Table, rewires: Table) -> None:
@@ -126,16 +126,18 @@ class _Tree:
     def _turn_to_pages(self, edges: Table, rewires: Table) -> None:
         """Take what was drawn before this batch over to pages."""
         empty = np.zeros(0, self._line)
-        self._pages = Pages(self._canvas, f"{self._entity}_pages", self._strips, empty, self._style)
+        entity, colour = f"{self._entity}_pages", scene.packed(self._colour)
+
+        def style(rows: int) -> Any:
+            return self._canvas.row_style(self._canvas.lines, rows, -0.75, 20.0, colour)
+
+        self._pages = Pages(self._canvas, entity, self._strips, empty, style)
         if self._drawn:
             first = merged([edges, rewires])[:1]
             self._pages.fill(np.concatenate(self._drawn), moments(first)[0])
             assert self._root is not None  # noqa: S101 - nothing is drawn before the root
             self._canvas.put_away(self._entity, first[0], self._root)
             self._drawn.clear()
-
-    def _style(self, entity: str) -> None:
-        self._canvas.style(entity, self._canvas.lines, self._colour, -0.75, 20.0)
 
     def _lines(self, rows: Table) -> NDArray[np.void]:
         lines = np.empty(len(rows), self._line)
