@@ -25,8 +25,8 @@ EXPANSIONS, LAST = range(2)
 """Places in `counts`."""
 
 
-@inlined
-def iterate(
+@kernel
+def advance(
     lattice: Lattice,
     search: Search,
     counts: NDArray[np.int64],
@@ -34,7 +34,16 @@ def iterate(
     log: Buffer,
     limit: int,
 ) -> int:
-    """One call of `advance`."""
+    """Run until solved, proved hopeless, out of room, or `limit` cells are expanded.
+
+    Args:
+        lattice: The cells.
+        search: What is open and closed.
+        counts: Cells expanded, and the newest of them or -1 before the first; shape (2,).
+        space: Configuration space.
+        log: Events.
+        limit: Cells to expand in all.
+    """
     enter_cells(lattice)
     if counts[LAST] < 0:
         counts[LAST] = 0
@@ -55,25 +64,3 @@ def iterate(
         # The straight way on is as long as the estimate: no other path can be shorter.
         if expand(search, lattice, space, log, best, counts[EXPANSIONS]):
             return SOLVED
-
-
-@kernel
-def advance(
-    lattice: Lattice,
-    search: Search,
-    counts: NDArray[np.int64],
-    space: Any,
-    log: Buffer,
-    limit: int,
-) -> int:
-    """Run until solved, proved hopeless, out of room, or `limit` cells are expanded.
-
-    Args:
-        lattice: The cells.
-        search: What is open and closed.
-        counts: Cells expanded, and the newest of them or -1 before the first; shape (2,).
-        space: Configuration space.
-        log: Events.
-        limit: Cells to expand in all.
-    """
-    return iterate(lattice, search, counts, space, log, limit)
