@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.kernels.emit import Buffer, room
-from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.jit import kernel
 from brrt.kernels.lattice import (
     Lattice,
     Search,
