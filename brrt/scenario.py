@@ -66,8 +66,6 @@ class Scenario:
                 raise BrrtError(f"{name} must be a text, not {getattr(self, name)!r}")
         if not isinstance(self.smooth, bool):
             raise BrrtError(f"smooth must be true or false, not {self.smooth!r}")
-        if self.planner not in PLANNERS:
-            raise unknown("planner", self.planner, PLANNERS)
         if self.robot not in ROBOTS:
             raise unknown("robot", self.robot, ROBOTS)
         if self.clock not in ("real", "logical"):
@@ -79,9 +77,11 @@ class Scenario:
             _whole("draws", self.draws, low=1)
         if self.time is not None and not _positive(self.time):
             raise BrrtError(f"time must be above 0 seconds, not {self.time!r}")
-        settings = self.make_planner().as_dict()
-        given = {name: settings[name] for name in self.params}
-        object.__setattr__(self, "params", given)
+        # A recording of a planner that is not known here can be read all the same.
+        if self.planner in PLANNERS:
+            settings = self.settings()
+            given = {name: settings[name] for name in self.params}
+            object.__setattr__(self, "params", given)
 
     @classmethod
     def parse(cls, values: Mapping[str, Any]) -> Self:
@@ -133,8 +133,20 @@ class Scenario:
         return replace(self, draws=max(1, iterations), time=None)
 
     def make_planner(self) -> Planner:
-        """Make the planner with its settings."""
+        """Make the planner with its settings.
+
+        Raises:
+            BrrtError: There is no such planner here.
+        """
+        if self.planner not in PLANNERS:
+            raise unknown("planner", self.planner, PLANNERS)
         return PLANNERS[self.planner].parse(f"planner {self.planner}", self.params)
+
+    def settings(self) -> dict[str, Any]:
+        """All settings of the planner; of one that is not known here, those that were given."""
+        if self.planner not in PLANNERS:
+            return dict(self.params)
+        return self.make_planner().as_dict()
 
     def make_smoother(self) -> Shortcut | None:
         """Make the smoother, if there is to be one."""
