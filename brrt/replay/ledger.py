@@ -47,6 +47,7 @@ class Ledger(NamedTuple):
         parent_cost: Cost of the parent when the change was made, nan without one, shape (m,).
         before: Cost of the node right before the change, nan where it joins, shape (m,).
         verdict: Whether the change could be made; one that could not is left out; shape (m,).
+        answers: What the nodes that were asked for cost then, nan where they were not there.
     """
 
     parent: Ints
@@ -54,6 +55,7 @@ class Ledger(NamedTuple):
     parent_cost: Floats
     before: Floats
     verdict: NDArray[np.uint8]
+    answers: Floats
 
 
 def changes(events: Events, tree: int) -> Changes:
@@ -86,7 +88,22 @@ def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
     return length
 
 
-def fold(made: Changes, length: Floats | None = None) -> Ledger:
+class Questions(NamedTuple):
+    """What nodes cost at certain moments, to be answered on the way.
+
+    Attributes:
+        seq: After the events up to this one, rising, shape (k,).
+        node: Of which node, shape (k,).
+    """
+
+    seq: Ints
+    node: Ints
+
+
+NONE = Questions(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -> Ledger:
     """Make the changes one after another; the costs of all descendants follow each.
 
     Args:
@@ -94,6 +111,7 @@ def fold(made: Changes, length: Floats | None = None) -> Ledger:
         length: Length of the edge that each change makes, shape (m,). By default it is what the
             event states less the parent's cost at that moment, which is right to a rounding of
             the cost; so costs are right to about depth roundings.
+        asked: Questions.
     """
     nodes = int(made.joins.sum())
     if length is None:
@@ -102,11 +120,14 @@ def fold(made: Changes, length: Floats | None = None) -> Ledger:
     cost, lengths = np.zeros(nodes), np.zeros(nodes)
     parent_cost, before = np.full(len(made.seq), np.nan), np.full(len(made.seq), np.nan)
     verdict = np.zeros(len(made.seq), np.uint8)
+    answers = np.full(len(asked.seq), np.nan)
+    moments = np.searchsorted(made.seq, asked.seq, side="right")
     _fold(
+        moments, np.asarray(asked.node, np.int64), answers,
         made.node, made.parent, made.stated, made.joins, np.ascontiguousarray(length, np.float64),
         parent, links, cost, lengths, parent_cost, before, verdict,
     )  # fmt: skip
-    return Ledger(parent, cost, parent_cost, before, verdict)
+    return Ledger(parent, cost, parent_cost, before, verdict, answers)
 
 
 _CHILD, _NEXT, _LAST = range(3)
@@ -154,8 +175,23 @@ def _join(v: int, p: int, parent: Ints, links: Ints) -> None:
         links[first, _LAST] = v
 
 
+@borrowing
+def _answer(
+    question: int, i: int, moments: Ints, asked: Ints, answers: Floats, cost: Floats, born: int
+) -> int:
+    """Answer what is asked after i changes, from `question` on; return the next question."""
+    while question < len(asked) and moments[question] <= i:
+        if 0 <= asked[question] < born:
+            answers[question] = cost[asked[question]]
+        question += 1
+    return question
+
+
 @kernel
 def _fold(
+    moments: Ints,
+    asked: Ints,
+    answers: Floats,
     node: Ints,
     new_parent: Ints,
     stated: Floats,
@@ -169,9 +205,10 @@ def _fold(
     before: Floats,
     verdict: NDArray[np.uint8],
 ) -> None:
-    """See `fold`; the arrays from `parent` on are written."""
-    born = 0
+    """See `fold`; a question waits for its number of changes; from `parent` on it writes."""
+    born, question = 0, 0
     for i in range(len(node)):
+        question = _answer(question, i, moments, asked, answers, cost, born)
         v, p = node[i], new_parent[i]
         if joins[i]:
             born += 1
@@ -181,10 +218,8 @@ def _fold(
             continue
         else:
             before[i] = cost[v]
-        if p < 0 and joins[i]:
-            continue
         if not 0 <= p < born or (joins[i] and p == v):
-            verdict[i] = NO_PARENT
+            verdict[i] = SOUND if p < 0 and joins[i] else NO_PARENT
             continue
         parent_cost[i] = cost[p]
         if not joins[i]:
@@ -199,3 +234,4 @@ def _fold(
         while at >= 0:
             cost[at] = cost[parent[at]] + lengths[at]
             at = _below(v, at, parent, links)
+    _answer(question, len(node), moments, asked, answers, cost, born)
