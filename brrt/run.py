@@ -92,7 +92,9 @@ class Run:
         path, iteration = None, 0
         for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
             for event in batch[Kind.PATH]:
-                path, iteration = event["waypoints"], int(event["iteration"])
+                path = event["waypoints"]
+            # A planner may have gone on after its path; the count never falls.
+            iteration = batch.last.iteration if len(batch) else iteration
             yield batch
         if path is not None and self._smoother is not None and not self.stop.interrupted:
             space = self.problem.space

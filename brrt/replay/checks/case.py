@@ -146,19 +146,28 @@ class Case:
     known: bool
 
     @classmethod
-    def of(cls, manifest: Manifest, world: World, events: Events) -> Self:
+    def of(
+        cls, manifest: Manifest, world: World, events: Events, contract: Contract | None = None
+    ) -> Self:
         """Open the case of a recording.
+
+        Args:
+            manifest: The run's.
+            world: The run's.
+            events: The whole log.
+            contract: What the planner promises; by default what the registered one does.
 
         Raises:
             BrrtError: Its query is of no use in its world.
         """
         scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
-        problem, known = scenario.make_problem(world), scenario.planner in PLANNERS
-        contract = scenario.make_planner().contract(problem) if known else Contract()
+        problem = scenario.make_problem(world)
+        if contract is None and scenario.planner in PLANNERS:
+            contract = scenario.make_planner().contract(problem)
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
             manifest, world, events, problem.robot, problem.start, problem.goal, *bounds,
-            contract, known,
+            contract or Contract(), contract is not None,
         )  # fmt: skip
 
     def distance(self, a: Floats, b: Floats) -> Floats:

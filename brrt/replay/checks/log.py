@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Kind, Phase, Status, Table
+from brrt.events import FIELDS, Events, Kind, Phase, Source, Status, Table
 from brrt.replay.checks.case import Case, Tally
 
 _HEAD = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
@@ -137,11 +137,12 @@ def bounds(case: Case, tally: Tally) -> None:
 
 
 def samples(case: Case, tally: Tally) -> None:
-    """Samples of the goal are the goal."""
+    """Samples of the goal are the goal; the other tree's goal is the start."""
     table = case.events[Kind.SAMPLE]
-    goals = table[table["source"] == 1]
-    target = np.where(goals["tree"][:, None] == 1, case.start, case.goal)
-    wrong = (np.asarray(goals["q"]) != target).any(axis=1)
+    goals = table[table["source"] == Source.GOAL]
+    q = np.asarray(goals["q"])
+    wrong = (q != case.goal).any(axis=1)
+    wrong &= (goals["tree"] != 1) | (q != case.start).any(axis=1)
     tally.look(goals, wrong, lambda i: f"sample {text(goals['q'][i])} is not the goal")
 
 
