@@ -41,7 +41,7 @@ def insert_some(tree: KdTree, space: PointSpace, points: Floats, first: int) -> 
     """Insert points from `first` on while there is room; return the first that is not in."""
     n = first
     while n < len(points) and has_room(tree):
-        insert(tree, space, points, n)
+        insert(tree, space, points, n, 0)
         n += 1
     return n
 
@@ -52,21 +52,21 @@ def nearest_of_all(
 ) -> None:
     """Find the node nearest to each query."""
     for row in range(len(queries)):
-        nodes[row] = nearest(tree, space, queries, row)
+        nodes[row] = nearest(tree, space, queries, row, 0)
 
 
 def test_python_is_refused() -> None:
     """What only kernels may call says so; without its wrapper a call would be a crash."""
     points = np.zeros((2, 2))
-    tree, space = rooted_kdtree(points[0], 4), space_of(2)
+    tree, space = rooted_kdtree(points[:1], 4), space_of(2)
     nearest_of_all(tree, space, points, np.zeros(2, np.int64))
     with pytest.raises(TypeError, match="nearest is called by kernels alone"):
-        nearest(tree, space, points, 0)
+        nearest(tree, space, points, 0, 0)
 
 
 def planted(points: Floats, capacity: int = 4) -> KdTree:
     """The tree of all points, inserted one by one, grown whenever it is full."""
-    space, tree = space_of(points.shape[1]), rooted_kdtree(points[0], capacity)
+    space, tree = space_of(points.shape[1]), rooted_kdtree(points[:1], capacity)
     done = 1
     while done < len(points):
         done = insert_some(tree, space, points, done)
@@ -139,7 +139,7 @@ def test_while_growing(dim: int) -> None:
     """The answers are right after each insertion, also across splits and growth."""
     rng = np.random.default_rng(dim)
     points, space = clustered(rng, dim, 400), space_of(dim)
-    tree = rooted_kdtree(points[0], 1)
+    tree = rooted_kdtree(points[:1], 1)
     for n in range(1, len(points)):
         while insert_some(tree, space, points[: n + 1], n) == n:
             tree = grown_kdtree(tree, 2 * n)

@@ -16,21 +16,24 @@ from brrt.kernels.jit import inlined
 INTS = 3
 """Integer fields that a kind may have; `emit` takes this many."""
 
-_COUNT, _FIRST_SEQ, _LAST_T, _ORIGIN, _TICK = range(5)
+_COUNT, _FIRST_SEQ, _LAST_T, _ORIGIN, _TICK, _POINTS = range(6)
 
 
 class Buffer(NamedTuple):
     """Columns that a kernel writes; which field stands where follows from `events.FIELDS`.
 
     Attributes:
-        state: Events held, seq of the first, time of the last, the clock's origin, and the ns
-            between two events of a logical clock (0: a real clock); shape (5,), int64.
+        state: Events held, seq of the first, time of the last, the clock's origin, the ns between
+            two events of a logical clock (0: a real clock), and rows of `points` in use; shape
+            (6,), int64.
         kind: Shape (n,), uint8.
         t: Time in ns since the origin, shape (n,), int64.
         iteration: Shape (n,), int64.
         ints: A kind's integer fields in their order, shape (n, 3), int32.
         real: A kind's float field, shape (n,).
         q: Configurations, shape (n, dof).
+        points: Waypoints of all paths, shape (n, dof); a path's event holds in `ints`, behind its
+            own fields, its first row and how many it has.
     """
 
     state: NDArray[np.int64]
@@ -40,6 +43,7 @@ class Buffer(NamedTuple):
     ints: NDArray[np.int32]
     real: NDArray[np.float64]
     q: NDArray[np.float64]
+    points: NDArray[np.float64]
 
 
 @inlined
@@ -93,12 +97,27 @@ def emit(
     state[_COUNT] = n + 1
 
 
+@inlined
+def point_room(buffer: Buffer) -> int:
+    """Waypoints that still fit."""
+    return len(buffer.points) - int(buffer.state[_POINTS])
+
+
+@inlined
+def take_points(buffer: Buffer, n: int) -> int:
+    """Reserve n rows of `points`, which the caller saw to be there; return the first."""
+    first = int(buffer.state[_POINTS])
+    buffer.state[_POINTS] += n
+    return first
+
+
 def _slots(kind: Kind) -> list[tuple[str, str, int]]:
     """For each field of a kind: its name, the column that holds it, and its place therein."""
     places, ints = [], 0
     for field in FIELDS[kind]:
         if field.type == "q[]":
-            places.append((field.name, "ragged", 0))
+            places.append((field.name, "points", ints))
+            ints += 2
         elif field.type == "q":
             places.append((field.name, "q", 0))
         elif field.type.startswith("float"):
@@ -164,20 +183,20 @@ class EventLog:
     def __init__(self, dof: int, capacity: int = 16384, *, logical_clock: bool = False) -> None:
         self.dof = dof
         self.buffer = Buffer(
-            state=np.zeros(5, np.int64),
+            state=np.zeros(6, np.int64),
             kind=np.empty(capacity, np.uint8),
             t=np.empty(capacity, np.int64),
             iteration=np.empty(capacity, np.int64),
             ints=np.empty((capacity, INTS), np.int32),
             real=np.empty(capacity, np.float64),
             q=np.empty((capacity, dof), np.float64),
+            points=np.empty((capacity, dof), np.float64),
         )
         self.buffer.state[_LAST_T] = -1
         self.buffer.state[_TICK] = 1000 if logical_clock else 0
         self.epoch_ns = 0 if logical_clock else time.time_ns()
         self._origin = time.perf_counter_ns()
         self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
-        self._ragged: dict[int, NDArray[np.float64]] = {}
 
     def __len__(self) -> int:
         return int(self.buffer.state[_COUNT])
@@ -187,16 +206,19 @@ class EventLog:
         """Events that fit before the next `drain`."""
         return len(self.buffer.kind) - len(self)
 
-    def reserve(self, events: int) -> None:
-        """Make a batch large enough for so many events, which a planner emits in one go."""
-        if events > len(self.buffer.kind):
-            larger = type(self)(self.dof, events).buffer
-            columns: list[tuple[NDArray[Any], NDArray[Any]]] = list(
-                zip(larger[1:], self.buffer[1:], strict=True)
-            )
-            for new, old in columns:
-                new[: len(old)] = old
-            self.buffer = larger._replace(state=self.buffer.state)
+    def reserve(self, events: int, points: int = 0) -> None:
+        """Make a batch large enough for what a planner emits in one go.
+
+        Args:
+            events: Events.
+            points: Waypoints of their paths.
+        """
+        b = self.buffer
+        if events > len(b.kind):
+            columns = (b.kind, b.t, b.iteration, b.ints, b.real, b.q)
+            self.buffer = b = Buffer(b.state, *(_longer(c, events) for c in columns), b.points)
+        if points > len(b.points):
+            self.buffer = b._replace(points=_longer(b.points, points))
 
     def _begin(self) -> None:
         """Let time count from now: what came before, such as opening files, is not the run's."""
@@ -219,7 +241,7 @@ class EventLog:
         Raises:
             BrrtError: A field is missing, not known or of no use, or the batch is full.
         """
-        buffer, row = self.buffer, len(self)
+        row = len(self)
         if row == 0 and self.buffer.state[_FIRST_SEQ] == 0:
             self._begin()
         self.tick()
@@ -227,6 +249,7 @@ class EventLog:
             self._put(kind, row, fields)
         except (KeyError, TypeError, ValueError, OverflowError, IndexError) as error:
             raise _unfit(kind, fields, self.dof, self.room, error) from None
+        buffer = self.buffer
         buffer.kind[row], buffer.iteration[row] = kind, iteration
         buffer.t[row] = buffer.state[_LAST_T] = self._time(row)
         buffer.state[_COUNT] = row + 1
@@ -237,8 +260,11 @@ class EventLog:
             raise KeyError
         for name, column, _ in slots:
             value = fields[name]
-            if column == "ragged":
-                self._ragged[row] = np.array(value, np.float64).reshape(len(value), self.dof)
+            if column == "points":
+                place = self._keep_points(value)
+                buffer = self.buffer  # it may have been replaced by a larger one
+                buffer.ints[row, ints : ints + 2] = place
+                ints += 2
             elif column == "q":
                 if len(value) != self.dof:  # numpy would spread a single number over all
                     raise ValueError
@@ -248,6 +274,16 @@ class EventLog:
             else:
                 buffer.ints[row, ints] = value
                 ints += 1
+
+    def _keep_points(self, points: Any) -> tuple[int, int]:
+        """Store a path's waypoints; return their first row and how many there are."""
+        rows = np.array(points, np.float64).reshape(len(points), self.dof)
+        first = int(self.buffer.state[_POINTS])
+        if first + len(rows) > len(self.buffer.points):
+            self.reserve(0, 2 * (first + len(rows)))
+        self.buffer.points[first : first + len(rows)] = rows
+        self.buffer.state[_POINTS] += len(rows)
+        return first, len(rows)
 
     def _time(self, row: int) -> int:
         state = self.buffer.state
@@ -269,25 +305,30 @@ class EventLog:
         columns = Buffer(
             b.state, b.kind[:n].copy(), b.t[:n].copy(), b.iteration[:n].copy(),
             b.ints[:n].copy(), b.real[:n].copy(), b.q[:n].copy(),
+            b.points[: b.state[_POINTS]].copy(),
         )  # fmt: skip
-        held = _Held(first, self.dof, columns, self._ragged)
-        self._ragged = {}
+        held = _Held(first, self.dof, columns)
         self.buffer.state[_FIRST_SEQ] += n
-        self.buffer.state[_COUNT] = 0
+        self.buffer.state[_COUNT] = self.buffer.state[_POINTS] = 0
         counts = np.bincount(columns.kind, minlength=len(Kind))
         present = {Kind(int(code)): int(counts[code]) for code in np.flatnonzero(counts)}
         last = Instant(int(columns.t[-1]), int(columns.iteration[-1])) if n else Instant(0, 0)
         return Events(self.dof, LazyTables(present, last, held.table))
 
 
+def _longer(column: NDArray[Any], n: int) -> NDArray[Any]:
+    longer = np.empty((n, *column.shape[1:]), column.dtype)
+    longer[: len(column)] = column
+    return longer
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Held:
-    """A batch out of the kernels' way: its columns, and what is too long for them, by row."""
+    """A batch out of the kernels' way."""
 
     first: int
     dof: int
     columns: Buffer
-    ragged: Mapping[int, NDArray[np.float64]]
 
     def table(self, kind: Kind) -> Table:
         """Gather the events of a kind, its fields under their names."""
@@ -298,9 +339,9 @@ class _Held:
         table["t"] = columns.t[rows]
         table["iteration"] = columns.iteration[rows]
         for name, column, place in _SLOTS[kind]:
-            if column == "ragged":
-                for i, row in enumerate(rows):
-                    table[name][i] = self.ragged[int(row)]
+            if column == "points":
+                for i, (begin, n) in enumerate(columns.ints[rows, place : place + 2].tolist()):
+                    table[name][i] = columns.points[begin : begin + n]
             elif column == "ints":
                 table[name] = columns.ints[rows, place]
             elif column == "real":

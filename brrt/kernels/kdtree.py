@@ -1,4 +1,4 @@
-"""Incremental nearest neighbours: a bucket k-d tree that grows with the planner's tree."""
+"""Incremental nearest neighbours: a bucket k-d tree that grows with the planner's trees."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.kernels.jit import borrowing, inlined
-from brrt.kernels.space import box_measure, measure
+from brrt.kernels.space import box_measure, length, measure
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,8 @@ class KdTree(NamedTuple):
     """Cells split once they hold more than 16 nodes, and are rebuilt once they are lopsided.
 
     Coordinates stand twice, in the planner's array and side by side in the buckets, where a
-    query finds those of a leaf in a few lines of the cache.
+    query finds those of a leaf in a few lines of the cache. Several trees may share the arrays:
+    cell r is the root of the r-th.
 
     Attributes:
         cells: For each cell its splitting axis, the cells below and above, and its nodes; for a
@@ -65,15 +66,19 @@ class KdTree(NamedTuple):
     work: NDArray[np.int64]
 
 
-def rooted_kdtree(root: Floats, capacity: int) -> KdTree:
-    """Make a tree that holds node 0 at `root`, shape (d,), with room for `capacity` nodes.
+def rooted_kdtree(roots: Floats, capacity: int) -> KdTree:
+    """Make a tree for each root, shape (trees, d), with room for `capacity` nodes in all.
 
-    Memory is taken only as the tree fills.
+    Node r is the root of the r-th. Memory is taken only as the trees fill.
     """
-    tree = _empty_kdtree(len(root), capacity)
-    tree.counts[:3] = 1
-    tree.cells[0] = _LEAF, 0, -1, 1
-    tree.boxes[0, :-1], tree.points[0], tree.nodes[0] = np.concatenate([root, root]), root, 0
+    trees, d = roots.shape
+    tree = _empty_kdtree(d, max(capacity, trees))
+    tree.counts[:3] = trees
+    for r, q in enumerate(roots):
+        tree.cells[r] = _LEAF, r, -1, 1
+        tree.built[r] = 1
+        tree.boxes[r, :-1], tree.nodes[BUCKET * r] = np.concatenate([q, q]), r
+        tree.points[BUCKET * r] = q
     return tree
 
 
@@ -299,15 +304,15 @@ def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
 
 
 @inlined
-def insert(tree: KdTree, space: Any, q: Floats, node: int) -> None:
-    """Add a node that stands at q[node]; the caller saw to it that the tree `has_room`.
+def insert(tree: KdTree, space: Any, q: Floats, node: int, root: int) -> None:
+    """Add a node that stands at q[node] to a tree; the caller saw to it that it `has_room`.
 
     A cell with 3/4 of its nodes on one side is rebuilt: trees grow outwards, and without this
     their frontier would lie ever deeper (a scapegoat tree; Galperin and Rivest 1993). A node that
     coincides with 16 others is left out: they answer for it.
     """
     d = len(space.lower)
-    cell, lopsided = 0, -1
+    cell, lopsided = root, -1
     while tree.cells[cell, _AXIS] != _LEAF:
         _stretch(tree, cell, q, node, d)
         tree.cells[cell, _SIZE] += 1
@@ -335,14 +340,14 @@ def insert(tree: KdTree, space: Any, q: Floats, node: int) -> None:
 
 
 @inlined
-def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:
-    """Return the node nearest to Q[row] in the robot's metric.
+def nearest(tree: KdTree, space: Any, Q: Floats, row: int, root: int) -> int:
+    """Return a tree's node nearest to Q[row] in the robot's metric.
 
     Each cell knows the box around its nodes. The half-space that a split leaves would not do:
     most samples lie far from a young tree, and its outer cells would have no end on that side.
     """
     d, stack = len(space.lower), tree.stack
-    best, node, cell, top = np.inf, -1, 0, 0
+    best, node, cell, top = np.inf, -1, root, 0
     while True:
         while tree.cells[cell, _AXIS] != _LEAF:
             side = 1 if Q[row, tree.cells[cell, _AXIS]] >= tree.boxes[cell, 2 * d] else 0
@@ -361,3 +366,49 @@ def nearest(tree: KdTree, space: Any, Q: Floats, row: int) -> int:
             cell = stack[top]
             if box_measure(space, tree.boxes, cell, Q, row) < best:
                 break
+
+
+@inlined
+def near(
+    tree: KdTree,
+    space: Any,
+    Q: Floats,
+    row: int,
+    root: int,
+    radius: float,
+    found: NDArray[np.int32],
+    far: Floats,
+) -> int:
+    """List a tree's nodes within a radius of Q[row], in no order that means anything.
+
+    Args:
+        tree: The trees.
+        space: Configuration space.
+        Q: Configurations, shape (n, d).
+        row: Which of them.
+        root: Which tree.
+        radius: Greatest distance in the robot's metric.
+        found: Where the nodes are written, as long as there are nodes.
+        far: Where their distances are written, of the same shape.
+
+    Returns:
+        How many there are.
+    """
+    stack, top, count = tree.stack, 1, 0
+    stack[0] = root
+    while top > 0:
+        top -= 1
+        cell = stack[top]
+        if length(space, box_measure(space, tree.boxes, cell, Q, row)) > radius:
+            continue
+        if tree.cells[cell, _AXIS] != _LEAF:
+            stack[top], stack[top + 1] = tree.cells[cell, _LEFT], tree.cells[cell, _RIGHT]
+            top += 2
+            continue
+        first = tree.cells[cell, _LEFT] * BUCKET
+        for at in range(first, first + tree.cells[cell, _SIZE]):
+            distance = length(space, measure(space, tree.points, at, Q, row))
+            if distance <= radius:
+                found[count], far[count] = tree.nodes[at], distance
+                count += 1
+    return count

@@ -14,18 +14,25 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from brrt.kernels.jit import INLINED, inlined
+from brrt.kernels.random import Random, uniform
 
 Floats = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _by_robot(function: F) -> F:
-    """Let kernels that call `function` get the kernel of that name from the space's class."""
+def _by_robot(function: F, default: Any = None) -> F:
+    """Let kernels that call `function` get the kernel of that name from the space's class.
+
+    Args:
+        function: What kernels call.
+        default: What they get where a robot has none of its own.
+    """
 
     @overload(function, strict=False, jit_options=INLINED)  # type: ignore[arg-type]
     def resolve(space: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
         if isinstance(space, types.BaseNamedTuple):
-            return getattr(space.instance_class, function.__name__).py_func  # type: ignore[attr-defined]
+            robot = space.instance_class  # type: ignore[attr-defined]
+            return getattr(robot, function.__name__, default).py_func
         return None
 
     return function
@@ -77,11 +84,11 @@ def distance(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:
 
 
 @inlined
-def sample_uniform(space: Any, rng: np.random.Generator, out: Floats, row: int) -> None:
+def sample_uniform(space: Any, rng: Random, out: Floats, row: int) -> None:
     """Draw a configuration evenly from the bounds into out[row]."""
     for k in range(len(space.lower)):
         low, high = space.lower[k], space.upper[k]
-        out[row, k] = min(low + (high - low) * rng.random(), high)
+        out[row, k] = min(low + (high - low) * uniform(rng), high)
 
 
 @inlined
@@ -103,3 +110,43 @@ def steer(
         return far
     interpolate(space, A, i, B, j, step / far, out, row)
     return step
+
+
+_INFORMED_DRAWS = 1000
+"""Draws after which a sample is taken as it is; a planner finds out that it is of no use."""
+
+
+@inlined
+def _sample_by_rejection(
+    space: Any, rng: Random, ends: Floats, start: int, goal: int, best: float, out: Floats, row: int
+) -> None:
+    """Draw from the bounds until the way over the sample may be shorter than the best."""
+    for _ in range(_INFORMED_DRAWS):
+        sample_uniform(space, rng, out, row)
+        there = distance(space, ends, start, out, row)
+        if there + distance(space, out, row, ends, goal) < best:
+            return
+
+
+def sample_informed(
+    space: Any, rng: Random, ends: Floats, start: int, goal: int, best: float, out: Floats, row: int
+) -> None:
+    """Draw evenly from the configurations over which a path may cost less than the best.
+
+    Gammell, Srinivasa and Barfoot 2014; a robot may have a way of its own to draw from that set.
+
+    Args:
+        space: Configuration space.
+        rng: Random draws.
+        ends: Where start and goal stand, shape (n, dof).
+        start: Row of the start.
+        goal: Row of the goal.
+        best: Cost of the best path.
+        out: Where the sample is written, shape (m, dof).
+        row: Its row.
+    """
+    own = getattr(space, "sample_informed", _sample_by_rejection)
+    own(space, rng, ends, start, goal, best, out, row)
+
+
+_by_robot(sample_informed, _sample_by_rejection)

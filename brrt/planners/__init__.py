@@ -2,9 +2,20 @@
 
 from collections.abc import Mapping
 
+from brrt.planners.bi_rrt import BiRRT
+from brrt.planners.bi_rrt_star import BiRRTStar
+from brrt.planners.contract import Contract
 from brrt.planners.planner import Planner
 from brrt.planners.rrt import RRT
+from brrt.planners.rrt_connect import RRTConnect
+from brrt.planners.rrt_star import RRTStar
 
-PLANNERS: Mapping[str, type[Planner]] = {"rrt": RRT}
+PLANNERS: Mapping[str, type[Planner]] = {
+    "rrt": RRT,
+    "rrt-connect": RRTConnect,
+    "bi-rrt": BiRRT,
+    "rrt-star": RRTStar,
+    "bi-rrt-star": BiRRTStar,
+}
 
-__all__ = ["PLANNERS", "RRT", "Planner"]
+__all__ = ["PLANNERS", "RRT", "BiRRT", "BiRRTStar", "Contract", "Planner", "RRTConnect", "RRTStar"]

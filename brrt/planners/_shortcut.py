@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from brrt.events import Kind
 from brrt.kernels.emit import Buffer, emit, room
 from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.random import Random, uniform
 from brrt.kernels.space import distance, segment_free
 
 Floats = NDArray[np.float64]
@@ -33,7 +34,7 @@ def attempt_all(
     counts: NDArray[np.int64],
     cost: Floats,
     space: Any,
-    rng: np.random.Generator,
+    rng: Random,
     log: Buffer,
     iteration: int,
     attempts: int,
@@ -46,7 +47,7 @@ def attempt_all(
         i, j = 0, 0
         while j - i < 2:
             # Waypoints that are neighbours already are drawn again: each pair is equally likely.
-            i, j = int(rng.random() * n), int(rng.random() * n)
+            i, j = int(uniform(rng) * n), int(uniform(rng) * n)
             i, j = min(i, j), max(i, j)
         accepted = segment_free(space, path, i, path, j)
         if accepted:
@@ -65,7 +66,7 @@ def shorten(
     counts: NDArray[np.int64],
     cost: Floats,
     space: Any,
-    rng: np.random.Generator,
+    rng: Random,
     log: Buffer,
     iteration: int,
     attempts: int,

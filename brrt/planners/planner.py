@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,7 +17,13 @@ from brrt.settings import Settings
 
 @dataclass(frozen=True, slots=True)
 class Planner(Settings):
-    """Base class; a planner from outside may as well be any object with this method."""
+    """Base class; a planner from outside may as well be any object with this method.
+
+    Attributes:
+        default_iterations: Iterations that a run may make where no budget is given.
+    """
+
+    default_iterations: ClassVar[int] = 1_000_000
 
     @abstractmethod
     def solve(

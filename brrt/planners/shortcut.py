@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status
 from brrt.kernels.emit import EventLog
+from brrt.kernels.random import borrow, give_back
 from brrt.planners import _shortcut
 from brrt.planners.stop import Stop
 from brrt.settings import Settings, param
@@ -45,17 +46,19 @@ class Shortcut(Settings):
         if log.room < 3:
             yield log.drain()
         log.emit(Kind.PHASE, iteration, name=Phase.SMOOTH, status=Status.BEGIN)
+        draws = borrow(rng)
         points, counts, cost = path.copy(), np.array([len(path), 0]), np.zeros(1)
         while True:
             log.tick()
             _shortcut.shorten(
-                points, counts, cost, space, rng, log.buffer, iteration, self.attempts
+                points, counts, cost, space, draws, log.buffer, iteration, self.attempts
             )
             waypoints, made = (int(n) for n in counts)
             if log.room < 2:
                 yield log.drain()
             if stop.interrupted or made >= self.attempts or waypoints <= 2:
                 break
+        give_back(draws, rng)
         log.emit(
             Kind.PATH,
             iteration,

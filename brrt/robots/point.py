@@ -9,10 +9,14 @@ from numpy.typing import NDArray
 
 from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
 from brrt.kernels.jit import inlined
+from brrt.kernels.random import Random, uniform
 from brrt.settings import Settings
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
+
+_INFORMED_DRAWS = 1000
+"""Draws from an ellipsoid, most of which lies outside the bounds, before one is moved inside."""
 
 
 class PointSpace(NamedTuple):
@@ -77,6 +81,64 @@ class PointSpace(NamedTuple):
         """Exact against every shape; bounds are convex, so the ends decide about them."""
         return not segment_hits(space.obstacles, A, i, B, j)
 
+    @staticmethod
+    @inlined
+    def sample_informed(
+        space: "PointSpace",
+        rng: Random,
+        ends: Floats,
+        start: int,
+        goal: int,
+        best: float,
+        out: Floats,
+        row: int,
+    ) -> None:
+        """Draw from the ellipsoid with its foci at start and goal, not by rejection.
+
+        A point of the unit ball is stretched to the ellipsoid's half axes, turned by the
+        reflection that takes the first axis to the line from start to goal, and moved there.
+        """
+        d, square, mirror = len(space.lower), 0.0, 0.0
+        for k in range(d):
+            square += (ends[goal, k] - ends[start, k]) ** 2
+        focal = math.sqrt(square)
+        for k in range(d):
+            mirror += _mirror(ends, start, goal, focal, k) ** 2
+        short = 0.5 * math.sqrt(max(0.0, best * best - square))
+        for _ in range(_INFORMED_DRAWS):
+            _sample_unit_ball(rng, d, out, row)
+            dot, inside = 0.0, True
+            for k in range(d):
+                out[row, k] *= 0.5 * best if k == 0 else short
+                dot += _mirror(ends, start, goal, focal, k) * out[row, k]
+            for k in range(d):
+                turned = out[row, k]
+                if mirror > 0.0:
+                    turned -= 2.0 * dot / mirror * _mirror(ends, start, goal, focal, k)
+                turned += 0.5 * (ends[start, k] + ends[goal, k])
+                inside = inside and space.lower[k] <= turned <= space.upper[k]
+                out[row, k] = min(max(turned, space.lower[k]), space.upper[k])
+            if inside:
+                return
+
+
+@inlined
+def _mirror(ends: Floats, start: int, goal: int, focal: float, k: int) -> float:
+    """Component of the first axis less the direction from start to goal; 0 where these coincide."""
+    if focal == 0.0:
+        return 0.0
+    return (1.0 if k == 0 else 0.0) - (ends[goal, k] - ends[start, k]) / focal
+
+
+@inlined
+def _sample_unit_ball(rng: Random, d: int, out: Floats, row: int) -> None:
+    norm = 2.0
+    while norm > 1.0:
+        norm = 0.0
+        for k in range(d):
+            out[row, k] = 2.0 * uniform(rng) - 1.0
+            norm += out[row, k] * out[row, k]
+
 
 @dataclass(frozen=True, slots=True)
 class Point(Settings):
@@ -90,6 +152,10 @@ class Point(Settings):
         """Put the robot into a world."""
         lower, upper = tuple(world.lower.tolist()), tuple(world.upper.tolist())
         return PointSpace(lower, upper, build_obstacles(world))
+
+    def unit_ball_volume(self, world: World) -> float:
+        """Area of the unit circle or volume of the unit sphere."""
+        return math.pi if world.dim == 2 else 4 / 3 * math.pi
 
     def collision(self, world: World, q: Floats) -> str | None:
         """Say why a configuration, shape (d,), is not free, or return None."""

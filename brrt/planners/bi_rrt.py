@@ -1,0 +1,91 @@
+"""Bidirectional RRT (Kuffner and LaValle 2000), in the variants that are in use."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from brrt.events import Events
+from brrt.kernels.emit import EventLog
+from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
+from brrt.planners import _bi_rrt
+from brrt.planners.contract import Contract
+from brrt.planners.drive import Loop, drive
+from brrt.planners.planner import Planner
+from brrt.planners.stop import Stop
+from brrt.problem import Problem
+from brrt.settings import param
+
+_TURNS = {"alternate": _bi_rrt.ALTERNATE, "smaller": _bi_rrt.SMALLER, "coin": _bi_rrt.COIN}
+
+
+@dataclass(frozen=True, slots=True)
+class BiRRT(Planner):
+    """Bidirectional RRT (Kuffner and LaValle 2000): one tree from the start, one from the goal.
+
+    In each iteration one tree grows towards a sample, and the other one then heads for the newest
+    node of the first. They are joined by a free motion of at most `step`. The defaults are those
+    of RRT-Extend-Extend; `rrt-connect` is the variant that links by connecting.
+    """
+
+    step: float | None = param(
+        None, "longest edge; 5 % of the map's longest side by default", above=0
+    )
+    grow: Literal["extend", "connect"] = param(
+        "extend", "towards the sample by one step, or step by step until it is reached or blocked"
+    )
+    link: Literal["extend", "connect"] = param(
+        "extend", "towards the other tree's newest node by one step, or step by step"
+    )
+    turn: Literal["alternate", "smaller", "coin"] = param(
+        "alternate",
+        "who grows: the trees in turn; the smaller one; or, with probability 0.5, a tree heads for "
+        "the other's newest node and otherwise the roles swap",
+    )
+    always_link: bool = param(
+        False, "head for the newest node of the other tree even where nothing could be added to it"
+    )
+
+    def contract(self, problem: Problem) -> Contract:
+        """See `Planner.contract`."""
+        step = step_length(self.step, problem)
+        return Contract(step=step, link=step)
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+        step = step_length(self.step, problem)
+        options = _bi_rrt.Options(
+            step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
+            self.always_link,
+        )  # fmt: skip
+        return solve(options, problem, rng, log, stop)
+
+
+def step_length(step: float | None, problem: Problem) -> float:
+    """Return the step that was set, or 5 % of the map's longest side."""
+    return step or 0.05 * problem.world.extent
+
+
+def solve(
+    options: _bi_rrt.Options,
+    problem: Problem,
+    rng: np.random.Generator,
+    log: EventLog,
+    stop: Stop,
+) -> Iterator[Events]:
+    """Plan with any variant; see `Planner.solve`."""
+    roots = np.array([problem.start, problem.goal])
+    counts = np.zeros(_bi_rrt.COUNTS, np.int64)
+    counts[_bi_rrt.NEWEST + 1] = 1
+    trees = _bi_rrt.Trees(
+        rooted_forest(roots, RESERVED_NODES), counts, np.zeros(1), scratch=roots.copy()
+    )
+    loop = Loop(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
+    return drive(loop, problem, rng, log, stop)
+
+
+def _grown(trees: _bi_rrt.Trees) -> _bi_rrt.Trees:
+    return trees._replace(forest=grown_forest(trees.forest))

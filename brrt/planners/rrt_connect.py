@@ -1,0 +1,42 @@
+"""RRT-Connect (Kuffner and LaValle 2000)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from brrt.events import Events
+from brrt.kernels.emit import EventLog
+from brrt.planners.bi_rrt import BiRRT
+from brrt.planners.contract import Contract
+from brrt.planners.planner import Planner
+from brrt.planners.stop import Stop
+from brrt.problem import Problem
+from brrt.settings import param
+
+
+@dataclass(frozen=True, slots=True)
+class RRTConnect(Planner):
+    """RRT-Connect (Kuffner and LaValle 2000): two trees, joined greedily.
+
+    One tree makes a step towards a sample, and the other one steps towards the new node until it
+    is reached or blocked; then they swap roles. It stops at the first path.
+    """
+
+    step: float | None = param(
+        None, "longest edge; 5 % of the map's longest side by default", above=0
+    )
+
+    def contract(self, problem: Problem) -> Contract:
+        """See `Planner.contract`."""
+        return self._variant.contract(problem)
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+        return self._variant.solve(problem, rng, log, stop)
+
+    @property
+    def _variant(self) -> BiRRT:
+        return BiRRT(step=self.step, grow="extend", link="connect", turn="alternate")

@@ -1,0 +1,132 @@
+"""RRT* (Karaman and Frazzoli 2011), with informed sampling as an option."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from brrt.events import Events
+from brrt.kernels.emit import EventLog
+from brrt.kernels.forest import grown, grown_forest, rooted_forest
+from brrt.planners import _star
+from brrt.planners.bi_rrt import step_length
+from brrt.planners.contract import Contract, Near
+from brrt.planners.drive import Loop, drive
+from brrt.planners.planner import Planner
+from brrt.planners.stop import Stop
+from brrt.problem import Problem
+from brrt.settings import param
+
+
+@dataclass(frozen=True, slots=True)
+class RRTStar(Planner):
+    """RRT* (Karaman and Frazzoli 2011): a tree whose paths come ever closer to the optimum.
+
+    Each new node chooses the parent over which it costs least from the nodes near it, and then
+    becomes the parent of those that it serves better. It goes on until the budget ends; each
+    better path is recorded.
+    """
+
+    default_iterations: ClassVar[int] = 20_000
+
+    step: float | None = param(
+        None, "longest edge; 5 % of the map's longest side by default", above=0
+    )
+    goal_bias: float = param(
+        0.05, "probability of drawing the goal until there is a path", low=0, high=1
+    )
+    gamma: float | None = param(
+        None,
+        "nodes are near within min(step, gamma (log n / n)^(1/d)); by default 10 % above the "
+        "proven bound, with the volume of the bounds for that of free space",
+        above=0,
+    )
+    informed: bool = param(
+        False, "once there is a path, draw only where a better one may lead (Gammell 2014)"
+    )
+    stop_at_first: bool = param(False, "stop at the first path")
+
+    def contract(self, problem: Problem) -> Contract:
+        """See `Planner.contract`."""
+        step = step_length(self.step, problem)
+        gamma = self.gamma or proven_gamma(problem)
+        return Contract(step=step, near=Near(gamma, step, problem.dof))
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+        options = _star.Options(
+            step=step_length(self.step, problem),
+            goal_bias=self.goal_bias,
+            gamma=self.gamma or proven_gamma(problem),
+            informed=self.informed,
+            stop_at_first=self.stop_at_first,
+            link=0.0,
+        )
+        return solve(options, problem.start[None], problem, rng, log, stop)
+
+
+def proven_gamma(problem: Problem) -> float:
+    """Return 1.1 times the factor above which RRT* converges to the optimum.
+
+    Karaman and Frazzoli 2011, theorem 38: (2 (1 + 1/d) V / B)^(1/d), where V is the volume of free
+    space, here that of the bounds, which is no less, and B that of the robot's unit ball.
+    """
+    d, space = problem.dof, problem.space
+    volume = math.prod(high - low for low, high in zip(space.lower, space.upper, strict=True))
+    ball = problem.robot.unit_ball_volume(problem.world)
+    return float(1.1 * (2 * (1 + 1 / d) * volume / ball) ** (1 / d))
+
+
+def solve(
+    options: _star.Options,
+    roots: np.ndarray,
+    problem: Problem,
+    rng: np.random.Generator,
+    log: EventLog,
+    stop: Stop,
+) -> Iterator[Events]:
+    """Plan with one tree or two, by their roots, shape (trees, dof); see `Planner.solve`."""
+    forest = rooted_forest(roots, len(roots) + 1 + len(roots) * (stop.iterations + 1))
+    n = len(forest.parent)
+    counts = np.zeros(_star.COUNTS, np.int64)
+    counts[[_star.GOAL_NODE, _star.BEST]] = -1
+    counts[_star.NEWEST + 1] = len(roots) - 1
+    if len(roots) == 1:
+        far = float(problem.robot.distance(problem.start, problem.goal))
+        counts[_star.GOAL_NEAR] = 0 < far <= options.step
+        counts[_star.GOAL_NODE] = -int(far > 0)
+    star = _star.Star(
+        forest=forest,
+        edge=np.zeros(n),
+        child=np.empty(n, np.int32),
+        sibling=np.empty((n, 2), np.int32),
+        near=np.empty(n, np.int32),
+        far=np.empty(n),
+        known=np.empty(n, np.uint8),
+        stack=np.empty(n, np.int32),
+        links=np.empty((n if len(roots) > 1 else 0, 2), np.int32),
+        counts=counts,
+        best=np.array([np.inf]),
+        scratch=np.array([problem.start, problem.start, problem.goal, problem.start]),
+    )
+    star.child[: len(roots)] = -1
+    star.sibling[: len(roots)] = -1
+    loop = Loop(_star.advance, star, options, _grown, 8, stop.iterations)
+    return drive(loop, problem, rng, log, stop)
+
+
+def _grown(star: _star.Star) -> _star.Star:
+    n, forest = int(star.forest.nodes[0]), grown_forest(star.forest)
+    capacity = len(forest.parent)
+    return star._replace(
+        forest=forest,
+        links=grown(star.links, int(star.counts[_star.LINKS]), capacity if len(star.links) else 0),
+        **{
+            name: grown(getattr(star, name), n, capacity)
+            for name in ("edge", "child", "sibling", "near", "far", "known", "stack")
+        },
+    )
