@@ -5,6 +5,7 @@ They stand in for planners from outside: they emit events and promise a contract
 
 from collections.abc import Iterator
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +116,7 @@ class Pair:
             sample = rng.uniform(problem.world.lower, problem.world.upper)
             for tree, nodes in enumerate(trees):
                 log.emit(Kind.SAMPLE, iteration, tree=tree, source=Source.UNIFORM, q=sample)
-                near = min(range(len(nodes)), key=lambda i: far(nodes[i][0], sample))  # noqa: B023
+                near = min(range(len(nodes)), key=lambda i: far(nodes[i][0], sample))
                 base, _, cost = nodes[near]
                 new = base + min(1.0, STEP / far(base, sample)) * (sample - base)
                 if free(problem, base, new):
@@ -161,7 +162,7 @@ class Walk:
         """A lattice without diagonals."""
         return Contract(lattice=Lattice(self.epsilon, False, self.max_move, 1))
 
-    def solve(
+    def solve(  # noqa: C901 - a paragraph of a paper, in one piece
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
@@ -253,4 +254,4 @@ class March:
         yield log.drain()
 
 
-TOYS = {"star": Star(), "pair": Pair(), "walk": Walk(), "march": March()}
+TOYS: dict[str, Any] = {"star": Star(), "pair": Pair(), "walk": Walk(), "march": March()}

@@ -148,7 +148,8 @@ def _enters_box(a: Floats, b: Floats, boxes: Floats) -> Flags:
     low, high = corners[0] + inset, corners[1] - inset
     step = b - a
     still, inside = step == 0, (low <= a) & (a <= high)
-    one, two = (low - a) / step, (high - a) / step
+    with np.errstate(divide="ignore", invalid="ignore"):  # where it stands still
+        one, two = (low - a) / step, (high - a) / step
     enter = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(one, two)).max(axis=1)
     leave = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(one, two)).min(axis=1)
     return np.asarray(np.maximum(enter, DEPTH) <= np.minimum(leave, 1 - DEPTH))
