@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brrt import RRT, BrrtError, Kind, McapSink, Memory, Metrics, Run, Scenario, read
+from brrt import RRT, BrrtError, Kind, McapSink, Memory, Metrics, Run, Scenario, forest, read
 from brrt.events import Events, Phase, Stage, Status, table_dtype
 from brrt.kernels.emit import EventLog
 from brrt.recording.rerun import RerunSink
@@ -156,3 +156,15 @@ def test_first_and_best_path() -> None:
     began = memory.events()[Kind.PHASE]["t"][0]
     assert figures["first_path_s"] == (paths["t"][0] - began) / 1e9
     assert figures["rewires"] == len(memory.events()[Kind.REWIRE]) > 0
+
+
+def test_replay_prints_the_trees_as_rewired(brrt: Callable[..., Result], tmp_path: Path) -> None:
+    """The depth on the screen is that of the tree after its rewires."""
+    run, memory = Run(replace(FOREIGN, smooth=False), planner=TOYS["star"]), Memory()
+    run.execute([memory, McapSink(tmp_path / "star.mcap", run.manifest, run.problem.world)])
+    log = memory.events()
+    tree = forest(log)[0]
+    assert tree.leaves != forest(Events(2, {Kind.EDGE: log[Kind.EDGE]}))[0].leaves
+    done = brrt("replay", "star.mcap")
+    assert done.out.split()[-1] == f"{tree.cost.max():.6g}"
+    assert done.out.split()[-3:-1] == [f"{tree.leaves:,}", f"{tree.depth:,}"]

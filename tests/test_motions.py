@@ -4,7 +4,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -84,6 +84,7 @@ class Bar:
         return np.asarray(np.hypot(step[..., 0], step[..., 1]) + np.hypot(1, 0.1) * turn)
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 2**32))
 def test_a_robot_with_an_outline(seed: int) -> None:
     """Against many places along the way, in the bar's own frame."""

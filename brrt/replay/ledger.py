@@ -145,12 +145,11 @@ def _below(root: int, at: int, parent: Ints, links: Ints) -> int:
 
 
 @borrowing
-def _descends(node: int, root: int, parent: Ints, links: Ints) -> bool:
-    """Whether `node` is `root` or below it; as much work as giving `root` a new cost."""
-    at = root
-    while at not in (-1, node):
-        at = _below(root, at, parent, links)
-    return at == node
+def _descends(root: int, node: int, parent: Ints) -> bool:
+    """Whether `node` is `root` or below it."""
+    while node not in (-1, root):
+        node = parent[node]
+    return node == root
 
 
 @borrowing
@@ -223,7 +222,7 @@ def _fold(
             continue
         parent_cost[i] = cost[p]
         if not joins[i]:
-            if _descends(p, v, parent, links):
+            if _descends(v, p, parent):
                 verdict[i] = CIRCLE
                 continue
             _leave(v, parent, links)

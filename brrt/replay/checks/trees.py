@@ -177,7 +177,7 @@ def _asked(case: Case, number: int, table: Table, name: str) -> tuple[Floats, Fl
     """Where the ends of links in a tree are, and what they cost then; nan where they are not."""
     q, cost = np.full((len(table), case.events.dof), np.nan), np.full(len(table), np.nan)
     for tree in case.trees:
-        if tree.number == number:
+        if tree.number == number and len(table):
             node = table[name].astype(np.int64)
             cost = fold(tree.made, tree.length, Questions(table["seq"], node)).answers
             there = np.isfinite(cost)
