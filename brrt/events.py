@@ -58,6 +58,8 @@ class Status(IntEnum):
     TIME_LIMIT = 3
     INTERRUPTED = 4
     DONE = 5
+    NO_PATH = 6
+    """Proved that there is none."""
 
 
 @unique

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -62,6 +62,7 @@ class Run:
             scenario = _named(scenario, planner)
         self._planner = scenario.make_planner() if planner is None else planner
         self.problem, self._smoother = scenario.make_problem(), scenario.make_smoother()
+        self._execute = scenario.make_execute()
         self._compile()
         self._log = EventLog(self.problem.dof, batch, logical_clock=scenario.clock == "logical")
         self.stop = scenario.make_stop()
@@ -85,20 +86,33 @@ class Run:
             path = np.array([problem.start, problem.goal])
             for _ in self._smoother.smooth(path, problem.space, rng, log, stop, 0):
                 pass
+        if self._execute is not None:
+            for _ in self._execute.drive(problem.start[None], problem.space, log, stop, 0):
+                pass
 
     def events(self) -> Iterator[Events]:
-        """Plan, then smooth; yield what happens, in batches."""
+        """Plan, smooth, drive; yield what happens, in batches."""
         rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
-        path, iteration = None, 0
+        path, moved, iteration = None, False, 0
         for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
-            for event in batch[Kind.PATH]:
-                path = event["waypoints"]
+            path = _last_path(batch, path)
+            moved = moved or Kind.MOVE in batch.counts
             # A planner may have gone on after its path; the count never falls.
             iteration = batch.last.iteration if len(batch) else iteration
             yield batch
-        if path is not None and self._smoother is not None and not self.stop.interrupted:
-            space = self.problem.space
-            yield from self._smoother.smooth(path, space, rng, self._log, self.stop, iteration)
+        if path is None:
+            return
+        waypoints = path["waypoints"]
+        space = self.problem.space
+        if self._smoother is not None and not self.stop.interrupted:
+            for batch in self._smoother.smooth(
+                waypoints, space, rng, self._log, self.stop, iteration
+            ):
+                waypoints = _last_path(batch, path)["waypoints"]
+                yield batch
+        # A planner that moves as it plans has driven its path by now.
+        if self._execute is not None and not moved and not self.stop.interrupted:
+            yield from self._execute.drive(waypoints, space, self._log, self.stop, iteration)
 
     def execute(
         self, sinks: Iterable[Sink] = (), watch: Callable[[Metrics], None] | None = None
@@ -142,6 +156,11 @@ def _named(scenario: Scenario, planner: Solver) -> Scenario:
         )
     settings = planner.as_dict() if isinstance(planner, Settings) else scenario.params
     return replace(scenario, params=settings)
+
+
+def _last_path(batch: Events, before: Any) -> Any:
+    """Return the batch's last event of kind path, or the one before where it has none."""
+    return batch[Kind.PATH][-1] if Kind.PATH in batch.counts else before
 
 
 def _close_all(sinks: list[Sink], *, whole: bool) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from brrt.errors import BrrtError, unknown
 from brrt.planners import PLANNERS, Planner
+from brrt.planners.execute import Execute
 from brrt.planners.shortcut import Shortcut
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
@@ -33,11 +34,15 @@ class Scenario:
         start: First configuration; the world's own by default.
         goal: Last configuration; the world's own by default.
         seed: Seed of every random draw of the planner and the smoother.
-        iterations: Iterations that the planner may make.
+        iterations: Iterations that the planner may make; by default as many as there is time for
+            or, without a limit of time, the planner's own default.
         draws: Draws that it may make, whether they count as iterations or not; for a re-run.
         time: Seconds that it may take.
         smooth: Shortcut the path once there is one.
         shortcuts: Attempts of the smoother.
+        execute: Drive the path in moves, as the real-time mode of the field has it.
+        max_move: Longest move, in the robot's metric.
+        deadline: Seconds for each move.
         clock: `real`, or `logical`: event n at n us, so that files are equal byte by byte.
     """
 
@@ -48,11 +53,14 @@ class Scenario:
     start: tuple[float, ...] | None = None
     goal: tuple[float, ...] | None = None
     seed: int = 0
-    iterations: int = 1_000_000
+    iterations: int | None = None
     draws: int | None = None
     time: float | None = None
     smooth: bool = True
     shortcuts: int = 100
+    execute: bool = False
+    max_move: float = 1.0
+    deadline: float = 2.0
     clock: Literal["real", "logical"] = "real"
 
     def __post_init__(self) -> None:
@@ -64,24 +72,30 @@ class Scenario:
         for name in ("world", "robot", "planner", "clock"):
             if not isinstance(getattr(self, name), str):
                 raise BrrtError(f"{name} must be a text, not {getattr(self, name)!r}")
-        if not isinstance(self.smooth, bool):
-            raise BrrtError(f"smooth must be true or false, not {self.smooth!r}")
+        for name in ("smooth", "execute"):
+            if not isinstance(getattr(self, name), bool):
+                raise BrrtError(f"{name} must be true or false, not {getattr(self, name)!r}")
         if self.robot not in ROBOTS:
             raise unknown("robot", self.robot, ROBOTS)
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
-        _whole("seed", self.seed, low=0)
-        _whole("iterations", self.iterations, low=1)
-        _whole("shortcuts", self.shortcuts, low=0)
-        if self.draws is not None:
-            _whole("draws", self.draws, low=1)
-        if self.time is not None and not _positive(self.time):
-            raise BrrtError(f"time must be above 0 seconds, not {self.time!r}")
+        self._check_numbers()
         # A recording of a planner that is not known here can be read all the same.
         if self.planner in PLANNERS:
             settings = self.settings()
             given = {name: settings[name] for name in self.params}
             object.__setattr__(self, "params", given)
+
+    def _check_numbers(self) -> None:
+        _whole("seed", self.seed, low=0)
+        _whole("shortcuts", self.shortcuts, low=0)
+        for name in ("iterations", "draws"):
+            if getattr(self, name) is not None:
+                _whole(name, getattr(self, name), low=1)
+        for name, unit in (("time", " seconds"), ("deadline", " seconds"), ("max_move", "")):
+            value = getattr(self, name)
+            if not _positive(value) and not (name == "time" and value is None):
+                raise BrrtError(f"{name} must be above 0{unit}, not {value!r}")
 
     @classmethod
     def parse(cls, values: Mapping[str, Any]) -> Self:
@@ -152,9 +166,16 @@ class Scenario:
         """Make the smoother, if there is to be one."""
         return Shortcut(attempts=self.shortcuts) if self.smooth else None
 
+    def make_execute(self) -> Execute | None:
+        """Make the real-time mode, if there is to be one."""
+        return Execute(max_move=self.max_move) if self.execute else None
+
     def make_stop(self) -> Stop:
         """Make the budget."""
-        return Stop(iterations=self.iterations, draws=self.draws, time_s=self.time)
+        planner = PLANNERS.get(self.planner, Planner)
+        usual = _MOST if self.time is not None else planner.default_iterations
+        iterations = usual if self.iterations is None else self.iterations
+        return Stop(iterations=iterations, draws=self.draws, time_s=self.time)
 
     def make_problem(self, world: World | None = None) -> Problem:
         """Make the world, unless it is at hand, and put the robot and the query into it.
@@ -180,7 +201,7 @@ class Scenario:
 
 
 def _positive(value: Any) -> bool:
-    return isinstance(value, int | float) and 0 < value < np.inf
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < np.inf
 
 
 def _whole(name: str, value: Any, *, low: int) -> None:

@@ -93,11 +93,11 @@ class Watch:
     """A progress bar that appears once a job has lasted a second, on a terminal alone.
 
     Args:
-        total: Where the bar ends.
+        total: Where the bar ends; None where nobody knows.
         waiting: What it says until the first `update`.
     """
 
-    def __init__(self, total: float, waiting: str) -> None:
+    def __init__(self, total: float | None, waiting: str) -> None:
         self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
@@ -108,7 +108,7 @@ class Watch:
             transient=True,
         )
         self._task = self._progress.add_task(waiting, total=None, figures="")
-        self._total = total
+        self.total = total
         self._timer = threading.Timer(1.0, self._progress.start)
         self._timer.daemon = True
 
@@ -127,5 +127,5 @@ class Watch:
     def update(self, done: float, what: str, figures: str) -> None:
         """Say how far the job is."""
         self._progress.update(
-            self._task, completed=done, total=self._total, description=what, figures=figures
+            self._task, completed=done, total=self.total, description=what, figures=figures
         )

@@ -59,7 +59,8 @@ def plan(
     iterations: Annotated[
         int | None,
         typer.Option(
-            help="Iterations before giving up. Default 1000000.", rich_help_panel="Planner"
+            help="Iterations before giving up. Default: the planner's own; with --time, no limit.",
+            rich_help_panel="Planner",
         ),
     ] = None,
     time: Annotated[
@@ -78,6 +79,23 @@ def plan(
     shortcuts: Annotated[
         int | None,
         typer.Option(help="Attempts of the smoother. Default 100.", rich_help_panel="Planner"),
+    ] = None,
+    execute: Annotated[
+        bool | None,
+        typer.Option(
+            "--execute/--no-execute",
+            help="Drive the path in moves, one in each deadline. Default no.",
+            rich_help_panel="Real time",
+            show_default=False,
+        ),
+    ] = None,
+    max_move: Annotated[
+        float | None,
+        typer.Option(help="Longest move. Default 1.", rich_help_panel="Real time"),
+    ] = None,
+    deadline: Annotated[
+        float | None,
+        typer.Option(help="Seconds for each move. Default 2.", rich_help_panel="Real time"),
     ] = None,
     mcap: Annotated[
         Path | None,
@@ -141,12 +159,14 @@ def plan(
     given = {
         "world": world, "robot": robot, "start": start, "goal": goal, "planner": planner,
         "seed": seed, "iterations": iterations, "time": time, "smooth": smooth,
-        "shortcuts": shortcuts, "clock": clock,
+        "shortcuts": shortcuts, "execute": execute, "max_move": max_move, "deadline": deadline,
+        "clock": clock,
     }  # fmt: skip
     settings = _merged(scenario, given, param or [])
     _warn_of_compiling()
     with Watch(settings.iterations, "preparing the planner").running() as watch:
         run = Run(settings)
+        watch.total = None if settings.time is not None else run.stop.iterations
         with stop_on_signals(run.stop):
             metrics = run.execute(_sinks(run, mcap, rrd, view=view), lambda m: _show(m, watch))
     _report(metrics, mcap, rrd, as_json=as_json)

@@ -195,9 +195,9 @@ def check_phases(run: Run, events: Events) -> None:
     counted = len(events[Kind.SAMPLE])
     if not scenario.make_planner().as_dict()["count_failed"]:
         counted = len(np.setdiff1d(events[Kind.EDGE]["iteration"], [0]))
-    assert counted <= scenario.iterations
+    assert counted <= run.stop.iterations
     if status(events) is Status.ITERATION_LIMIT:
-        assert counted == scenario.iterations
+        assert counted == run.stop.iterations
     else:
         assert status(events) is Status.SOLVED
 

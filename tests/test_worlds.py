@@ -461,7 +461,7 @@ def test_foreign_file(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     path.write_text("boundary 0 0 0 1 1 1")
     error = refused(lambda: make_world(str(path)))
-    assert error == f"{path}: not a world that brrt reads; it reads .json, .txt"
+    assert error == f"{path}: not a world that brrt reads; it reads .json, .map, .txt"
 
 
 @pytest.mark.parametrize("name", ["folder.txt", "folder.json"])

@@ -215,8 +215,9 @@ class EventLog:
         """
         b = self.buffer
         if events > len(b.kind):
-            columns = (b.kind, b.t, b.iteration, b.ints, b.real, b.q)
-            self.buffer = b = Buffer(b.state, *(_longer(c, events) for c in columns), b.points)
+            kind, t, iteration = (_longer(c, events) for c in (b.kind, b.t, b.iteration))
+            ints, real, q = (_longer(c, events) for c in (b.ints, b.real, b.q))
+            self.buffer = b = Buffer(b.state, kind, t, iteration, ints, real, q, b.points)
         if points > len(b.points):
             self.buffer = b._replace(points=_longer(b.points, points))
 

@@ -60,7 +60,7 @@ def kernel(fn: F) -> F:
     Nopython mode with IEEE semantics, without the GIL, cached on disk. No fastmath: the same seed
     gives the same bits on every machine.
     """
-    return _compiled(fn, {})
+    return _compiled(fn, {"_nrt": False})
 
 
 def prepared(fn: F, *args: Any) -> F:
@@ -113,14 +113,22 @@ def _compiled(fn: F, options: dict[str, Any]) -> F:
     if config.DISABLE_JIT:
         return fn
     resolve = dispatcher.get_call_template
-    # Numba compiles a callee anew for each constant that it is called with; a kernel would take
-    # twice as long to compile, for nothing that inlining does not bring anyway.
     dispatcher.get_call_template = lambda args, kws: resolve(
-        tuple(map(types.unliteral, args)), {k: types.unliteral(v) for k, v in kws.items()}
+        tuple(map(_plain, args)), {k: _plain(v) for k, v in kws.items()}
     )
     if options.get("no_cpython_wrapper"):
         _refuse_python(dispatcher)
     return cast("F", dispatcher)
+
+
+def _plain(argument: Any) -> Any:
+    """Return the type that a callee is compiled for: one for all integers, none for constants.
+
+    Numba compiles it anew for each constant and each width that it is called with; a kernel would
+    take twice as long to compile, for nothing that inlining does not bring anyway.
+    """
+    argument = types.unliteral(argument)
+    return types.int64 if isinstance(argument, types.Integer) else argument
 
 
 def _refuse_python(dispatcher: Any) -> None:

@@ -88,12 +88,13 @@ if config.DISABLE_JIT:
         return (rotated >> 11) * _TO_UNIT
 
 else:
+    _next_state: Any = _advance
 
     @numba.extending.register_jitable
     def uniform(draws: Random) -> float:
         """Draw from [0, 1)."""
         words = draws.words
-        high, low = _advance(words[0], words[1], words[2], words[3])  # type: ignore[call-arg]
+        high, low = _next_state(words[0], words[1], words[2], words[3])
         words[0], words[1] = high, low
         turn = high >> np.uint64(58)
         mixed = high ^ low

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 
+from brrt.planners.a_star import AStar
 from brrt.planners.bi_rrt import BiRRT
 from brrt.planners.bi_rrt_star import BiRRTStar
 from brrt.planners.contract import Contract
+from brrt.planners.lrta_star import LRTAStar
 from brrt.planners.planner import Planner
 from brrt.planners.rrt import RRT
 from brrt.planners.rrt_connect import RRTConnect
@@ -16,6 +18,19 @@ PLANNERS: Mapping[str, type[Planner]] = {
     "bi-rrt": BiRRT,
     "rrt-star": RRTStar,
     "bi-rrt-star": BiRRTStar,
+    "lrta-star": LRTAStar,
+    "a-star": AStar,
 }
 
-__all__ = ["PLANNERS", "RRT", "BiRRT", "BiRRTStar", "Contract", "Planner", "RRTConnect", "RRTStar"]
+__all__ = [
+    "PLANNERS",
+    "RRT",
+    "AStar",
+    "BiRRT",
+    "BiRRTStar",
+    "Contract",
+    "LRTAStar",
+    "Planner",
+    "RRTConnect",
+    "RRTStar",
+]

@@ -110,8 +110,8 @@ def connect(trees: Trees, log: Buffer, tree: int, node: int, far: float) -> None
     emit(log, CONNECT, counts[DRAWS], start, goal, 0, cost, trees.scratch, _NEW)
 
 
-@inlined
-def iterate(
+@kernel
+def advance(
     trees: Trees,
     space: Any,
     rng: Random,
@@ -120,7 +120,7 @@ def iterate(
     limit: int,
     draw_limit: int,
 ) -> int:
-    """One call of `advance`."""
+    """Run until solved, out of room, or until `limit` iterations or `draw_limit` draws are made."""
     forest, counts, scratch = trees.forest, trees.counts, trees.scratch
     if counts[STAGE] == _BEGIN:
         emit_roots(forest, log)
@@ -176,17 +176,3 @@ def iterate(
         else:
             counts[STAGE] = _DRAW
             counts[COUNTED] += 1
-
-
-@kernel
-def advance(
-    trees: Trees,
-    space: Any,
-    rng: Random,
-    log: Buffer,
-    options: Options,
-    limit: int,
-    draw_limit: int,
-) -> int:
-    """Run until solved, out of room, or until `limit` iterations or `draw_limit` draws are made."""
-    return iterate(trees, space, rng, log, options, limit, draw_limit)

@@ -96,8 +96,8 @@ def reach_goal(tree: Tree, space: Any, log: Buffer, node: int, options: Options)
     return True
 
 
-@inlined
-def iterate(
+@kernel
+def advance(
     tree: Tree,
     space: Any,
     rng: Random,
@@ -106,7 +106,7 @@ def iterate(
     limit: int,
     draw_limit: int,
 ) -> int:
-    """One call of `advance`."""
+    """Run until solved, out of room, or until `limit` iterations or `draw_limit` draws are made."""
     counts, scratch, forest = tree.counts, tree.scratch, tree.forest
     newest = counts[UNTESTED]
     if not counts[BEGUN]:
@@ -143,17 +143,3 @@ def iterate(
         counts[UNTESTED] = newest
         if newest >= 0 or options.count_failed:
             counts[COUNTED] += 1
-
-
-@kernel
-def advance(
-    tree: Tree,
-    space: Any,
-    rng: Random,
-    log: Buffer,
-    options: Options,
-    limit: int,
-    draw_limit: int,
-) -> int:
-    """Run until solved, out of room, or until `limit` iterations or `draw_limit` draws are made."""
-    return iterate(tree, space, rng, log, options, limit, draw_limit)

@@ -28,38 +28,6 @@ def path_cost(path: Floats, n: int, space: Any) -> float:
     return cost
 
 
-@inlined
-def attempt_all(
-    path: Floats,
-    counts: NDArray[np.int64],
-    cost: Floats,
-    space: Any,
-    rng: Random,
-    log: Buffer,
-    iteration: int,
-    attempts: int,
-) -> None:
-    """One call of `shorten`."""
-    cost[0] = path_cost(path, counts[WAYPOINTS], space)
-    while room(log) > 0 and counts[ATTEMPTS] < attempts and counts[WAYPOINTS] > 2:
-        n = counts[WAYPOINTS]
-        counts[ATTEMPTS] += 1
-        i, j = 0, 0
-        while j - i < 2:
-            # Waypoints that are neighbours already are drawn again: each pair is equally likely.
-            i, j = int(uniform(rng) * n), int(uniform(rng) * n)
-            i, j = min(i, j), max(i, j)
-        accepted = segment_free(space, path, i, path, j)
-        if accepted:
-            for k in range(j, n):
-                for axis in range(len(space.lower)):
-                    path[i + 1 + k - j, axis] = path[k, axis]
-            counts[WAYPOINTS] = n - (j - i - 1)
-            # Along a straight line the sum may round up; the cost never rises.
-            cost[0] = min(cost[0], path_cost(path, counts[WAYPOINTS], space))
-        emit(log, SHORTCUT, iteration, i, j, int(accepted), cost[0], path, 0)
-
-
 @kernel
 def shorten(
     path: Floats,
@@ -83,4 +51,21 @@ def shorten(
         iteration: The planner's count, for the events.
         attempts: Attempts to make in all.
     """
-    attempt_all(path, counts, cost, space, rng, log, iteration, attempts)
+    cost[0] = path_cost(path, counts[WAYPOINTS], space)
+    while room(log) > 0 and counts[ATTEMPTS] < attempts and counts[WAYPOINTS] > 2:
+        n = counts[WAYPOINTS]
+        counts[ATTEMPTS] += 1
+        i, j = 0, 0
+        while j - i < 2:
+            # Waypoints that are neighbours already are drawn again: each pair is equally likely.
+            i, j = int(uniform(rng) * n), int(uniform(rng) * n)
+            i, j = min(i, j), max(i, j)
+        accepted = segment_free(space, path, i, path, j)
+        if accepted:
+            for k in range(j, n):
+                for axis in range(len(space.lower)):
+                    path[i + 1 + k - j, axis] = path[k, axis]
+            counts[WAYPOINTS] = n - (j - i - 1)
+            # Along a straight line the sum may round up; the cost never rises.
+            cost[0] = min(cost[0], path_cost(path, counts[WAYPOINTS], space))
+        emit(log, SHORTCUT, iteration, i, j, int(accepted), cost[0], path, 0)

@@ -142,7 +142,7 @@ def draw(star: Star, space: Any, rng: Random, log: Buffer, options: Options) -> 
 def radius(star: Star, space: Any, tree: int, options: Options) -> float:
     """Return the radius of the neighbourhood of a node that is about to join a tree."""
     n = star.forest.nodes[1 + tree] + 1.0
-    return min(options.step, options.gamma * (math.log(n) / n) ** (1.0 / len(space.lower)))
+    return float(min(options.step, options.gamma * (math.log(n) / n) ** (1.0 / len(space.lower))))
 
 
 @inlined
@@ -360,8 +360,8 @@ def grown(star: Star, space: Any, options: Options, node: int) -> int:
     return _TELL
 
 
-@inlined
-def iterate(
+@kernel
+def advance(
     star: Star,
     space: Any,
     rng: Random,
@@ -370,7 +370,7 @@ def iterate(
     limit: int,
     draw_limit: int,
 ) -> int:
-    """One call of `advance`."""
+    """Run until done, out of room, or until `limit` iterations or `draw_limit` draws are made."""
     counts = star.counts
     if counts[STAGE] == _BEGIN:
         emit_roots(star.forest, log)
@@ -400,17 +400,3 @@ def iterate(
         if counts[STAGE] == _LINK:
             link(star, space, log, options)
         counts[STAGE] = stage
-
-
-@kernel
-def advance(
-    star: Star,
-    space: Any,
-    rng: Random,
-    log: Buffer,
-    options: Options,
-    limit: int,
-    draw_limit: int,
-) -> int:
-    """Run until done, out of room, or until `limit` iterations or `draw_limit` draws are made."""
-    return iterate(star, space, rng, log, options, limit, draw_limit)

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Stage
-from brrt.scenario import Manifest
+from brrt.scenario import Manifest, Scenario
 from brrt.worlds.world import World
 
 Colour = tuple[int, int, int]
@@ -175,8 +175,7 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
         "start": _numbers(manifest.start),
         "goal": _numbers(manifest.goal),
         "seed": scenario.seed,
-        "budget": f"{scenario.iterations:,} iterations"
-        + (f", {scenario.time:g} s" if scenario.time else ""),
+        "budget": _budget(scenario),
         "settings": ", ".join(f"{name}={value}" for name, value in settings.items()),
         "made by": ", ".join(f"{name} {value}" for name, value in manifest.made_by.items()),
     }
@@ -196,6 +195,13 @@ def _results(figures: Mapping[str, Any] | None) -> dict[str, str]:
         if figures[key] is not None:
             rows[name] = f"{figures[key]:.6g}"
     return rows
+
+
+def _budget(scenario: Scenario) -> str:
+    limits = [] if scenario.time is None else [f"{scenario.time:g} s"]
+    if scenario.iterations is not None:
+        limits.append(f"{scenario.iterations:,} iterations")
+    return ", ".join(limits) or "the planner's own"
 
 
 def _cell(value: object) -> str:

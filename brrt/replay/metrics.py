@@ -149,7 +149,7 @@ class _Moves:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._deadline = max(1, round(1e9 * getattr(scenario, "deadline", 2.0)))
+        self._deadline = max(1, round(1e9 * scenario.deadline))
         self._trial, self._count = 0, 0
         self._last_t: int | None = None
         self._longest = self._misses = self._charged = self._stays = 0

@@ -127,7 +127,7 @@ def _mirror(ends: Floats, start: int, goal: int, focal: float, k: int) -> float:
     """Component of the first axis less the direction from start to goal; 0 where these coincide."""
     if focal == 0.0:
         return 0.0
-    return (1.0 if k == 0 else 0.0) - (ends[goal, k] - ends[start, k]) / focal
+    return float((1.0 if k == 0 else 0.0) - (ends[goal, k] - ends[start, k]) / focal)
 
 
 @inlined

@@ -16,6 +16,7 @@ from brrt.worlds.generators import (
     Spheres3D,
     Squares2D,
 )
+from brrt.worlds.movingai import load_grid
 from brrt.worlds.world import World
 
 GENERATORS: Mapping[str, type[Generator]] = {
@@ -28,6 +29,7 @@ GENERATORS: Mapping[str, type[Generator]] = {
 
 LOADERS: Mapping[str, Callable[[Path, str], World]] = {
     ".json": lambda path, text: _named(str(path), World.from_json(text)),
+    ".map": load_grid,
     ".txt": load_blocks,
 }
 """Readers of world files by the file's ending."""

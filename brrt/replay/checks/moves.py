@@ -78,7 +78,7 @@ def _longest(case: Case, table: Table) -> Floats:
     if lattice is not None:
         diagonal = lattice.epsilon * (np.sqrt(case.world.dim) if lattice.diagonals else 1.0)
         most[:] = max(lattice.max_move, diagonal)
-    most[_executed(case, table)] = getattr(case.manifest.scenario, "max_move", 1.0)
+    most[_executed(case, table)] = case.manifest.scenario.max_move
     return most
 
 

@@ -1,0 +1,89 @@
+"""Grid maps: every cell of the file is free or blocked in the world, and bad files say where."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from brrt.errors import BrrtError
+from brrt.worlds import make_world
+from brrt.worlds.movingai import BLOCKED, FREE, parse_grid, rectangles
+
+GRIDS = Path(__file__).parents[2] / "shared" / "worlds" / "movingai"
+HEAD = "type octile\nheight 2\nwidth 3\nmap\n"
+
+
+@given(
+    st.integers(1, 12), st.integers(1, 12), st.integers(0, 2**32), st.sampled_from([0.2, 0.7, 1])
+)
+def test_boxes_are_the_blocked_cells(rows: int, columns: int, seed: int, part: float) -> None:
+    """Painted back, the boxes give the file's cells, and none is painted twice."""
+    rng = np.random.default_rng(seed)
+    cells = rng.random((rows, columns)) < part
+    text = "\n".join(
+        "".join(str(rng.choice(list(BLOCKED if cell else FREE))) for cell in row) for row in cells
+    )
+    world = parse_grid("grid", f"type octile\nheight {rows}\nwidth {columns}\nmap\n{text}\n")
+    assert world.lower.tolist() == [0, 0]
+    assert world.upper.tolist() == [columns, rows]
+    painted = np.zeros((rows, columns), int)
+    for x0, y0, x1, y1 in world.boxes.astype(int):
+        painted[y0:y1, x0:x1] += 1
+    assert (painted == cells).all()
+    for y, x in np.ndindex(cells.shape):
+        assert (world.obstacle_at([x + 0.5, y + 0.5]) is not None) == cells[y, x]
+
+
+def test_runs_of_rows_are_merged() -> None:
+    """A block is one box, a frame four."""
+    assert rectangles(np.ones((300, 200), bool)).tolist() == [[0, 0, 200, 300]]
+    frame = np.ones((5, 6), bool)
+    frame[1:-1, 1:-1] = False
+    assert len(rectangles(frame)) == 4
+
+
+def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
+    """As files from elsewhere do."""
+    world = parse_grid("grid", "type octile\r\nwidth 3\r\nheight 2\r\nmap\r\n.@.\r\n...\r\n\r\n")
+    assert world.boxes.tolist() == [[1, 0, 2, 1]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "grid:1: a grid map begins with the line 'type octile'"),
+        ("type tile\n", "grid:1: a grid map begins with the line 'type octile'"),
+        ("type octile\nheight 2\n", "grid:3: there must be a line 'height H' and a line 'width W'"),
+        ("type octile\nheight 2\nheight 2\nmap\n", "grid:3: there must be a line 'height H'"),
+        ("type octile\nheight 2 2\nwidth 3\nmap\n", "grid:2: there must be a line 'height H'"),
+        ("type octile\nheight 0\nwidth 3\nmap\n", "grid:2: height must be a whole number from 1"),
+        ("type octile\nheight -2\nwidth 3\nmap\n", "grid:2: height must be a whole number from 1"),
+        ("type octile\nheight ²\nwidth 3\nmap\n", "grid:2: height must be a whole number from 1"),
+        ("type octile\nheight 2\nwidth 1e9\nmap\n", "grid:3: width must be a whole number from 1"),
+        (f"type octile\nheight 2\nwidth {'9' * 5000}\nmap\n", "grid:3: width must be a whole"),
+        ("type octile\nheight 2\nwidth 3\n...\n...\n", "grid:4: there must be the line 'map'"),
+        (HEAD + "...\n", "grid: 1 rows below 'map'; the header says height 2"),
+        (HEAD + "...\n...\n...\n", "grid: 3 rows below 'map'; the header says height 2"),
+        (HEAD + "...\n....\n", "grid:6: 4 characters; the header says width 3"),
+        (HEAD + ".X.\n...\n", "grid:5: unknown character 'X'; a cell is one of .GS (free) or @OTW"),
+        (HEAD + "...\n.é.\n", "grid:6: unknown character 'é'"),
+    ],
+)
+def test_errors_say_where(text: str, message: str) -> None:
+    """One line, with the number of the line at fault."""
+    with pytest.raises(BrrtError) as error:
+        parse_grid("grid", text)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+def test_real_maps() -> None:
+    """Real files load; their sizes are in their names or headers."""
+    if not GRIDS.exists():
+        pytest.skip("no grid maps here")
+    for name, size in (("arena", (49, 49)), ("den312d", (65, 81)), ("maze-32-32-2", (32, 32))):
+        world = make_world(str(GRIDS / f"{name}.map"))
+        assert world.upper.tolist() == list(size)
+        assert len(world.boxes)
