@@ -129,7 +129,7 @@ def test_toys_have_no_findings(name: str, seed: int) -> None:
 @given(scenarios(), st.sampled_from(list(PLANNERS)), st.booleans())
 def test_contracts_hold(scenario: Scenario, planner: str, smooth: bool) -> None:
     """Whatever world, seed and settings: no finding."""
-    shared = ("step",) if "rrt" in planner else ()
+    shared: tuple[str, ...] = ("step",) if "rrt" in planner else ()
     shared = tuple(scenario.params) if planner == "rrt" else shared
     params = {name: value for name, value in scenario.params.items() if name in shared}
     chosen = replace(scenario, planner=planner, params=params, smooth=smooth)
