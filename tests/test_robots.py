@@ -564,3 +564,79 @@ def test_a_recording_needs_no_robot_file(brrt: Callable[..., Result]) -> None:
     replayed = brrt("replay", "elsewhere/run.mcap", "--json")
     assert replayed.json == planned.json
     assert brrt("replay", "elsewhere/run.mcap", "--rrd", "run.rrd").code == 0
+
+
+# Real input, and the classic experiments
+
+
+needs_real = pytest.mark.skipif(not REAL.is_dir(), reason="no real robots here")
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples(path: Path) -> None:
+    """Each is solved, but for the one that cannot be."""
+    run = Run(Scenario.load(path))
+    figures = run.execute().as_dict()
+    assert figures["solved"] == ("unreachable" not in path.stem)
+    if figures["solved"]:
+        check_path(run, np.array(figures["path"]))
+        check_path(run, np.array(figures["smoothed_path"]))
+
+
+def real_scenario(folder: Path, name: str) -> Scenario:
+    """Translate one of the real experiments into files of ours."""
+    data = json.loads((REAL / "polygon_and_chain.json").read_text())
+    given, (x0, y0, x1, y1) = data["worlds"][name], data["region"]
+    polygons = [
+        (np.array(obstacle["polygon"], float) + obstacle["at"]).tolist()
+        for obstacle in given["obstacles"]
+    ]
+    world = World("real", np.array([x0, y0]), np.array([x1, y1]), polygons=tuple(polygons))
+    robot = {key: value for key, value in given["robot"].items() if key != "kind"}
+    (folder / "robot.json").write_text(
+        json.dumps({**HEAD, "kind": given["robot"]["kind"], **robot})
+    )
+    world.save(folder / "world.json")
+    return Scenario(
+        world=str(folder / "world.json"), robot=str(folder / "robot.json"),
+        start=tuple(given["start"]), goal=tuple(given["goal"]),
+    )  # fmt: skip
+
+
+@needs_real
+@pytest.mark.parametrize("name", ["robot_world", "robot_arm_world"])
+def test_real_experiments(name: str, tmp_path: Path) -> None:
+    """Planned, and free by the twin."""
+    run = Run(real_scenario(tmp_path, name))
+    figures = run.execute().as_dict()
+    assert figures["solved"]
+    check_path(run, np.array(figures["path"]))
+    check_path(run, np.array(figures["smoothed_path"]))
+
+
+@needs_real
+@pytest.mark.parametrize("links", [3])
+def test_horn(links: int, tmp_path: Path) -> None:
+    """A chain of line segments among line segments, joints without limits, links kept apart."""
+    data = json.loads((REAL / f"horn_{links:02}.json").read_text())
+    length = data["link_length"]
+    joints = tuple(
+        Joint((length if i else 0.0, 0.0), np.array([[0.0, 0.0], [length, 0.0]]), None)
+        for i in range(links)
+    )
+    x, y = data["base"]
+    robot = Chain(links, self_collision=True, base_x=x, base_y=y, joints=joints)
+    walls = tuple(np.array(segment).reshape(2, 2) for segment in data["segments"])
+    World("horn", np.full(2, -1.2), np.full(2, 1.2), polygons=walls).save(tmp_path / "world.json")
+    (tmp_path / "robot.json").write_text(robot.to_json())
+    run = Run(
+        Scenario(
+            world=str(tmp_path / "world.json"), robot=str(tmp_path / "robot.json"),
+            start=tuple(data["start"]), goal=tuple(data["goal"]),
+            params={"step": 0.3}, iterations=2_000_000,
+        )
+    )  # fmt: skip
+    figures = run.execute().as_dict()
+    assert figures["solved"]
+    check_path(run, np.array(figures["path"]))
