@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -358,7 +361,7 @@ def test_volume_of_the_unit_ball(kind: str) -> None:
     """As counted by drawing from a box around the ball."""
     rng = np.random.default_rng(5)
     world = World("empty", np.zeros(2), np.full(2, 100.0))
-    robot = {**MAKERS, "point": lambda _: Point()}[kind](rng).settled(world)
+    robot = MAKERS[kind](rng) if kind in MAKERS else Point()
     dof = robot.dof(world)
     # The extent of the ball along each coordinate, from the distance of a small step.
     halves = 0.01 / np.array([robot.distance(np.zeros(dof), 0.01 * e) for e in np.eye(dof)])
@@ -551,6 +554,29 @@ def test_a_run_from_end_to_end(kind: str) -> None:
         check_path(run, path)
         cost = run.problem.robot.distance(path[:-1], path[1:]).sum()
         assert figures[f"{name}_cost"] == pytest.approx(cost)
+
+
+@BODIES
+def test_kernels_are_plain_python(kind: str) -> None:
+    """Uncompiled, they do the same, bit for bit."""
+    scenario = json.dumps(RUNS[kind].as_dict() | {"iterations": 40})
+    program = (
+        "import sys, json; from brrt import Memory, Run, Scenario;"
+        "run, log = Run(Scenario.parse(json.loads(sys.argv[1]))), Memory();"
+        "run.execute([log]);"
+        "print([event['q'].tobytes().hex() for kind in ('EDGE', 'REJECT')"
+        " for event in log.events()[__import__('brrt').Kind[kind]]])"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program, scenario],
+            env={**os.environ, "NUMBA_DISABLE_JIT": word},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for word in ("0", "1")
+    ]  # fmt: skip
+    assert said[0] == said[1]
+    assert len(said[0]) > 100
 
 
 def test_a_recording_needs_no_robot_file(brrt: Callable[..., Result]) -> None:
