@@ -17,7 +17,7 @@ from brrt.replay.checks import Finding, check
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
-from brrt.robots import ROBOTS, Point
+from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds import GENERATORS, World, make_world
@@ -28,6 +28,7 @@ __all__ = [
     "ROBOTS",
     "RRT",
     "BrrtError",
+    "Chain",
     "Difference",
     "Events",
     "Finding",
@@ -38,9 +39,11 @@ __all__ = [
     "Metrics",
     "Planner",
     "Point",
+    "Polygon",
     "Problem",
     "Recording",
     "RecordingError",
+    "Robot",
     "Run",
     "Scenario",
     "Sink",
@@ -49,6 +52,7 @@ __all__ = [
     "check",
     "first_difference",
     "forest",
+    "make_robot",
     "make_world",
     "read",
 ]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.robots import Point
+from brrt.robots import Robot
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -19,42 +19,47 @@ class Problem:
 
     Attributes:
         world: Bounds and obstacles.
-        robot: What moves.
+        robot: What moves; settled in the world.
         start: First configuration, shape (dof,).
         goal: Last configuration, shape (dof,).
         space: The robot's configuration space in this world, as kernels see it.
 
     Raises:
-        BrrtError: Start or goal has the wrong size, is not finite, out of bounds or in collision.
+        BrrtError: The robot cannot be in this world, or start or goal has the wrong size, is not
+            finite, out of bounds or in collision.
     """
 
     world: World
-    robot: Point
+    robot: Robot
     start: Floats
     goal: Floats
     space: Any = field(init=False)
 
     def __post_init__(self) -> None:
         """Check start and goal."""
+        object.__setattr__(self, "robot", self.robot.settled(self.world))
+        object.__setattr__(self, "space", self.robot.space(self.world))
         for name in ("start", "goal"):
             q = np.array(getattr(self, name), dtype=np.float64).reshape(-1)
             text = ",".join(f"{x:g}" for x in q)
             if len(q) != self.dof:
+                names = ",".join(self.robot.coordinates(self.world))
                 raise BrrtError(
-                    f"{name} {text} has {len(q)} numbers; a configuration here has {self.dof}"
+                    f"{name} {text} has {len(q)} numbers; a configuration here has {self.dof}: "
+                    f"{names}"
                 )
             if not np.isfinite(q).all():
                 raise BrrtError(f"{name} {text} must be finite numbers")
+            q = self.robot.canonical(q)
             why = self.robot.collision(self.world, q)
             if why is not None:
                 lower, upper = (
-                    ",".join(f"{x:g}" for x in b) for b in (self.world.lower, self.world.upper)
+                    ",".join(f"{x:g}" for x in b) for b in (self.space.lower, self.space.upper)
                 )
                 raise BrrtError(
                     f"{name} {text} {why}; choose a free one between {lower} and {upper}"
                 )
             object.__setattr__(self, name, q)
-        object.__setattr__(self, "space", self.robot.space(self.world))
 
     @property
     def dof(self) -> int:

@@ -74,6 +74,7 @@ class Run:
             dof=self.problem.dof,
             epoch_ns=self._log.epoch_ns,
             made_by=made_by(),
+            robot=self.problem.robot.to_json(),
         )
 
     def _compile(self) -> None:

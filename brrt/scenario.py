@@ -15,7 +15,7 @@ from brrt.planners.execute import Execute
 from brrt.planners.shortcut import Shortcut
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
-from brrt.robots import ROBOTS
+from brrt.robots import Robot, make_robot, names_robot_file, robot_from_json
 from brrt.worlds import World, make_world
 
 _MOST = 10**15
@@ -28,7 +28,7 @@ class Scenario:
 
     Attributes:
         world: A generator with parameters (`circles2d:n=50`) or a file.
-        robot: Name of a robot.
+        robot: A robot with parameters (`polygon:length=4`) or a file.
         planner: Name of a planner.
         params: The planner's settings where they differ from its defaults.
         start: First configuration; the world's own by default.
@@ -75,8 +75,8 @@ class Scenario:
         for name in ("smooth", "execute"):
             if not isinstance(getattr(self, name), bool):
                 raise BrrtError(f"{name} must be true or false, not {getattr(self, name)!r}")
-        if self.robot not in ROBOTS:
-            raise unknown("robot", self.robot, ROBOTS)
+        if not names_robot_file(self.robot):
+            make_robot(self.robot)
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
         self._check_numbers()
@@ -129,10 +129,11 @@ class Scenario:
             raise BrrtError(f"{path}: {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise BrrtError(f"{path}: not TOML: {error}") from None
-        # A map named in the file is looked for beside it first.
-        world = values.get("world")
-        if isinstance(world, str) and (path.parent / world).is_file():
-            values["world"] = str(path.parent / world)
+        # A map or a robot named in the file is looked for beside it first.
+        for name in ("world", "robot"):
+            beside = values.get(name)
+            if isinstance(beside, str) and (path.parent / beside).is_file():
+                values[name] = str(path.parent / beside)
         try:
             return cls.parse(values)
         except BrrtError as error:
@@ -177,27 +178,38 @@ class Scenario:
         iterations = usual if self.iterations is None else self.iterations
         return Stop(iterations=iterations, draws=self.draws, time_s=self.time)
 
-    def make_problem(self, world: World | None = None) -> Problem:
-        """Make the world, unless it is at hand, and put the robot and the query into it.
+    def make_robot(self) -> Robot:
+        """Make the robot.
 
         Raises:
-            BrrtError: The world cannot be made, or start or goal is missing or of no use.
+            BrrtError: Its file cannot be read or is not a robot.
         """
+        return make_robot(self.robot)
+
+    def make_problem(self, world: World | None = None, robot: Robot | None = None) -> Problem:
+        """Make the world and the robot, unless they are at hand, and put the query into them.
+
+        Raises:
+            BrrtError: World or robot cannot be made, or start or goal is missing or of no use.
+        """
+        robot = self.make_robot() if robot is None else robot
         ends = [None if q is None else np.array(q) for q in (self.start, self.goal)]
         if world is None:
-            world = make_world(self.world, *ends)
+            first, last = (None if q is None else robot.position(q) for q in ends)
+            world = make_world(self.world, first, last, robot.room)
         start, goal = (
-            given if given is not None else own
+            given if given is not None or own is None else robot.configuration(own)
             for given, own in zip(ends, (world.start, world.goal), strict=True)
         )
         for name, q in (("start", start), ("goal", goal)):
             if q is None:
-                example = ",".join(["x", "y", "z"][: world.dim])
+                example = ",".join(robot.coordinates(world))
                 raise BrrtError(
-                    f"world {self.world} has no {name} of its own; give --{name} {example}"
+                    f"world {self.world} has no {name} of its own for the robot {self.robot}; "
+                    f"give --{name} {example}"
                 )
         assert start is not None and goal is not None  # noqa: S101, PT018 - told apart above
-        return Problem(world, ROBOTS[self.robot](), start, goal)
+        return Problem(world, robot, start, goal)
 
 
 def _positive(value: Any) -> bool:
@@ -233,6 +245,8 @@ class Manifest:
         dof: Numbers in a configuration.
         epoch_ns: Wall clock (ns since 1970) at time 0 of the events.
         made_by: Versions of brrt and of what it stands on, and the platform.
+        robot: The robot's definition in JSON, settled in the world; None in recordings that were
+            made before there were robots to define.
     """
 
     scenario: Scenario
@@ -242,12 +256,22 @@ class Manifest:
     dof: int
     epoch_ns: int
     made_by: Mapping[str, str]
+    robot: str | None = None
 
     FORMAT = "1"
 
+    def make_robot(self) -> Robot:
+        """Make the robot that the run was made with, even where its file is gone.
+
+        Raises:
+            BrrtError: Its definition is damaged.
+        """
+        return self.scenario.make_robot() if self.robot is None else robot_from_json(self.robot)
+
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
-        return {
+        texts = {} if self.robot is None else {"robot": self.robot}
+        return texts | {
             "format": self.FORMAT,
             "scenario": json.dumps(self.scenario.as_dict()),
             "start": json.dumps(self.start),
@@ -278,6 +302,7 @@ class Manifest:
                 int(texts["dof"]),
                 int(texts["epoch_ns"]),
                 dict(json.loads(texts["made_by"])),
+                texts.get("robot"),
             )
         except (KeyError, ValueError, TypeError, RecursionError) as error:
             raise BrrtError(f"the manifest is damaged: {error!r}") from None

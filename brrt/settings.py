@@ -7,7 +7,7 @@ the help texts and the manifest.
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
 from typing import Any, Literal, Self, get_args, get_origin, get_type_hints
 
 from brrt.errors import BrrtError, unknown
@@ -42,7 +42,7 @@ class Settings:
             BrrtError: A value has the wrong type or lies outside its range.
         """
         hints = get_type_hints(type(self))
-        for f in fields(self):
+        for f in _params(self):
             value = _typed(f.name, getattr(self, f.name), hints[f.name])
             _check_range(f.name, value, f.metadata)
             object.__setattr__(self, f.name, value)
@@ -58,7 +58,7 @@ class Settings:
         Raises:
             BrrtError: A name is not known, or a value is of no use.
         """
-        names = [f.name for f in fields(cls)]
+        names = [f.name for f in _params(cls)]
         for name in values:
             if name not in names:
                 raise unknown(f"parameter of {owner}", name, names)
@@ -67,7 +67,7 @@ class Settings:
 
     def as_dict(self) -> dict[str, Any]:
         """Names and values, as `parse` takes them."""
-        return asdict(self)
+        return {f.name: getattr(self, f.name) for f in _params(self)}
 
     @classmethod
     def describe(cls) -> list[dict[str, str]]:
@@ -81,9 +81,28 @@ class Settings:
                 "range": _range_text(f.metadata, hints[f.name]),
                 "doc": f.metadata["doc"],
             }
-            for f in fields(cls)
-            if f.default is not MISSING
+            for f in _params(cls)
         ]
+
+
+def pairs(owner: str, text: str) -> dict[str, str]:
+    """Split `a=1,b=2` into names and values.
+
+    Raises:
+        BrrtError: A part is no pair.
+    """
+    found: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        name, equals, value = part.partition("=")
+        if not equals:
+            raise BrrtError(f"{owner}: {part!r} must read name=value")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def _params(settings: Any) -> list[Field[Any]]:
+    """Return the fields that were declared by `param`: a class may have others besides."""
+    return [f for f in fields(settings) if "doc" in f.metadata]
 
 
 def _text(value: Any) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events
+from brrt.robots import Chain, Polygon, Robot
 from brrt.worlds import World
 
 Floats = NDArray[np.float64]
@@ -55,11 +56,37 @@ def segment_hits_ball(a: Point, b: Point, ball: Point, margin: float = 0.0) -> b
     return sum(x * x for x in gap) <= (radius + Fraction(margin)) ** 2
 
 
+def segment_hits_polygon(a: Point, b: Point, polygon: Floats) -> bool:
+    """Whether the closed segment a b touches a closed polygon: an edge, or from within."""
+    p, q, corners = exact(a), exact(b), [exact(corner) for corner in polygon]
+    edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
+    if any(_segments_meet(p, q, u, v) for u, v in edges):
+        return True
+    return len(corners) > 2 and all(_left_of(u, v, p) >= 0 for u, v in edges)
+
+
+def _left_of(u: list[Fraction], v: list[Fraction], p: list[Fraction]) -> Fraction:
+    return (v[0] - u[0]) * (p[1] - u[1]) - (v[1] - u[1]) * (p[0] - u[0])
+
+
+def _segments_meet(
+    p: list[Fraction], q: list[Fraction], u: list[Fraction], v: list[Fraction]
+) -> bool:
+    """Whether the boxes around two segments meet, and each has the other's ends on both sides."""
+    for k in range(2):
+        if max(p[k], q[k]) < min(u[k], v[k]) or max(u[k], v[k]) < min(p[k], q[k]):
+            return False
+    across = _left_of(p, q, u) * _left_of(p, q, v) <= 0
+    return across and _left_of(u, v, p) * _left_of(u, v, q) <= 0
+
+
 def hits(world: World, a: Point, b: Point) -> bool:
     """Whether the closed segment a b touches an obstacle."""
     boxes, balls = _close_to(world, a, b)
-    return any(segment_hits_box(a, b, box) for box in boxes) or any(
-        segment_hits_ball(a, b, ball) for ball in balls
+    return (
+        any(segment_hits_box(a, b, box) for box in boxes)
+        or any(segment_hits_ball(a, b, ball) for ball in balls)
+        or any(segment_hits_polygon(a, b, polygon) for polygon in world.polygons)
     )
 
 
@@ -76,7 +103,108 @@ def nearly_hits(world: World, a: Point, b: Point) -> bool:
         around = [*ends, ball[:d] - ball[d], ball[:d] + ball[d]]
         if segment_hits_ball(a, b, ball, NEAR * np.ptp(around, axis=0).max()):
             return True
+    for polygon in world.polygons:
+        near = NEAR * np.ptp([*ends, *polygon], axis=0).max()
+        if hull_distance(ends[None], polygon[None])[0] <= near:
+            return True
     return False
+
+
+def hull_distance(one: Floats, other: Floats) -> Floats:
+    """Distances of moving convex shapes from another, 0 where they touch or overlap.
+
+    The least of all distances between a vertex of one and an edge of the other; 0 where edges
+    cross or a vertex lies inside.
+
+    Args:
+        one: Vertices counter-clockwise at each of t moments, shape (t, k, 2).
+        other: Vertices of the other, at each moment or once for all, shape (t or 1, m, 2).
+    """
+    one, other = one[:, :, None, :], other[:, None, :, :]
+    p, q = (one, np.roll(one, -1, axis=1)), (other, np.roll(other, -1, axis=2))
+    far = np.minimum(_to_segment(one, *q).min(axis=(1, 2)), _to_segment(other, *p).min(axis=(1, 2)))
+    sides = [_side(*p, other), _side(*p, q[1]), _side(*q, one), _side(*q, p[1])]
+    crossing = (sides[0] * sides[1] < 0) & (sides[2] * sides[3] < 0)
+    meet = np.asarray(crossing.any(axis=(1, 2)))
+    if one.shape[1] > 2:
+        meet |= np.asarray(np.all(sides[0] >= 0, axis=1)).any(axis=1)
+    if other.shape[2] > 2:
+        meet |= np.asarray(np.all(sides[2] >= 0, axis=2)).any(axis=1)
+    return np.where(meet, 0.0, far)
+
+
+def _to_segment(point: Floats, a: Floats, b: Floats) -> Floats:
+    """Distances of points from segments a b; arrays of (x, y) that broadcast."""
+    along, offset = b - a, point - a
+    square = (along * along).sum(axis=-1)
+    part = (along * offset).sum(axis=-1) / np.where(square > 0, square, 1.0)
+    gap = offset - np.clip(part, 0, 1)[..., None] * along
+    return np.asarray(np.hypot(gap[..., 0], gap[..., 1]))
+
+
+def _side(a: Floats, b: Floats, point: Floats) -> Floats:
+    """Above 0 where points lie left of the line from a to b."""
+    along, offset = b - a, point - a
+    return np.asarray(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0])
+
+
+def moving_body(robot: Robot, Q: Floats) -> list[Floats]:
+    """Vertices of each part at each of t configurations, shape (t, k, 2), by complex numbers."""
+    if isinstance(robot, Polygon):
+        z, turn = Q[:, 0] + 1j * Q[:, 1], np.exp(1j * Q[:, 2])
+        frames = [(z, turn)] * len(robot.parts)
+        parts = list(robot.parts)
+    else:
+        assert isinstance(robot, Chain)
+        assert robot.base_x is not None
+        assert robot.base_y is not None
+        z, turn = np.full(len(Q), robot.base_x + 1j * robot.base_y), np.ones(len(Q), complex)
+        frames, parts = [], [joint.link for joint in robot.joints]
+        for k, joint in enumerate(robot.joints):
+            z = z + complex(*joint.offset) * turn
+            turn = turn * np.exp(1j * Q[:, k])
+            frames.append((z, turn))
+    placed = [
+        z[:, None] + turn[:, None] * (part[:, 0] + 1j * part[:, 1])
+        for part, (z, turn) in zip(parts, frames, strict=True)
+    ]
+    return [np.stack([part.real, part.imag], axis=-1) for part in placed]
+
+
+def clearance(world: World, robot: Robot, Q: Floats) -> Floats:
+    """Distances of a body from what it must not touch at t configurations; 0 where it does."""
+    parts = moving_body(robot, Q)
+    far = np.full(len(Q), np.inf)
+    for part in parts:
+        walls = np.minimum(part - world.lower, world.upper - part).min(axis=(1, 2))
+        far = np.minimum(far, np.maximum(walls, 0.0))
+        for x, y, radius in world.balls:
+            gaps = hull_distance(part, np.array([[[x, y]]])) - radius
+            far = np.minimum(far, np.maximum(gaps, 0.0))
+        for a, b, c, d in world.boxes:
+            corners = np.array([[a, b], [c, b], [c, d], [a, d]], float)
+            if a == c or b == d:
+                corners = np.unique(corners, axis=0)
+            far = np.minimum(far, hull_distance(part, corners[None]))
+        for polygon in world.polygons:
+            far = np.minimum(far, hull_distance(part, polygon[None]))
+    if isinstance(robot, Chain) and robot.self_collision:
+        for i in range(len(parts)):
+            for j in range(i + 2, len(parts)):
+                far = np.minimum(far, hull_distance(parts[i], parts[j]))
+    return far
+
+
+def densified(robot: Robot, a: Floats, b: Floats, n: int) -> Floats:
+    """Configurations at n + 1 even steps of a motion, angles that wrap the short way round."""
+    step = b - a
+    endless = np.zeros(len(a), bool)
+    if isinstance(robot, Polygon):
+        endless[2] = True
+    elif isinstance(robot, Chain):
+        endless = np.array([joint.limits is None for joint in robot.joints])
+    step = np.where(endless & (np.abs(step) > np.pi), step - np.sign(step) * 2 * np.pi, step)
+    return np.asarray(a + step * np.linspace(0, 1, n + 1)[:, None])
 
 
 def _close_to(world: World, a: Point, b: Point) -> tuple[Floats, Floats]:

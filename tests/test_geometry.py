@@ -29,8 +29,8 @@ def world_of(
     dim: int, *, low: float = 0.0, high: float = 10.0, balls: object = (), boxes: object = ()
 ) -> World:
     """A square or cubic world."""
-    arrays = [np.array(rows, dtype=np.float64) for rows in (balls, boxes)]
-    return World("test", np.full(dim, low), np.full(dim, high), *arrays)
+    balls, boxes = (np.array(rows, dtype=np.float64) for rows in (balls, boxes))
+    return World("test", np.full(dim, low), np.full(dim, high), balls, boxes)
 
 
 @kernel
@@ -442,3 +442,54 @@ def test_many_obstacles_share_cells(dim: int) -> None:
     obstacles = build_obstacles(world)
     assert len(obstacles.items) <= 64 * 3000 + 4096
     check(world, random_segments(rng, dim, 30))
+
+
+# Polygons
+
+
+def polygon_world(rng: np.random.Generator, n: int) -> World:
+    """Convex polygons and line segments in and around [0, 10]^2, of sizes from tiny to large."""
+    polygons = []
+    for _ in range(n):
+        k = int(rng.integers(2, 9))
+        angles = (np.arange(k) + rng.uniform(-0.3, 0.3, k)) * 2 * np.pi / k
+        size = 3 * 10.0 ** -rng.uniform(0, 5)
+        corners = size * np.stack([np.cos(angles), rng.uniform(0.1, 1) * np.sin(angles)], axis=1)
+        polygons.append(rng.uniform(-2, 12, 2) + corners)
+    return World("polygons", np.zeros(2), np.full(2, 10.0), polygons=tuple(polygons))
+
+
+def test_random_segments_among_polygons() -> None:
+    """Random segments, and segments along edges and through corners."""
+    rng = np.random.default_rng(90)
+    for n in (1, 3, 10, 30):
+        for _ in range(4):
+            world = polygon_world(rng, n)
+            check(world, random_segments(rng, 2, 60))
+            touching = []
+            for _ in range(60):
+                polygon = world.polygons[rng.integers(n)]
+                u, v = (polygon[k % len(polygon)] for k in rng.integers(0, 2) + np.arange(2))
+                along = rng.normal(size=2) if rng.random() < 0.5 else v - u
+                along *= 10.0 ** rng.uniform(-2, 1)
+                before, after = rng.choice([0.0, 0.3, 1.0], 2)
+                a, b = v - before * along, v + after * along
+                if world.inside(a) and world.inside(b):
+                    touching.append((a, b))
+            check(world, touching)
+
+
+@MANY
+@given(st.data())
+def test_polygons_on_a_lattice_agree_exactly(data: st.DataObject) -> None:
+    """In small whole numbers nothing rounds: touching is decided exactly."""
+    corner = st.tuples(st.integers(0, 10), st.integers(0, 10))
+    shapes = st.lists(st.lists(corner, min_size=2, max_size=3, unique=True), max_size=5)
+    polygons = [
+        np.array(shape, float)
+        for shape in data.draw(shapes)
+        if len(shape) == 2 or np.linalg.det(np.diff(shape, axis=0)) != 0
+    ]
+    world = World("lattice", np.zeros(2), np.full(2, 10.0), polygons=tuple(polygons))
+    ends = data.draw(st.lists(st.tuples(corner, corner), min_size=1, max_size=20))
+    check_exactly(world, [(np.array(a, float), np.array(b, float)) for a, b in ends])

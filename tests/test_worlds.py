@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 MAPS = Path(__file__).parents[2] / "shared" / "worlds" / "ece276b"
 EVERY = pytest.mark.parametrize("name", list(GENERATORS))
 BALLS, BOXES = ("circles2d", "spheres3d"), ("squares2d", "boxes2d", "boxes3d")
+POLYGONS = ("polygons2d",)
 ULPS = 1e-12
 """Sums of coordinates may round by this part of the map."""
 
@@ -33,13 +34,19 @@ def assert_same(one: World, other: World) -> None:
         else:
             assert a.shape == b.shape, field
             assert a.tobytes() == b.tobytes(), field
+    for a, b in zip(one.polygons, other.polygons, strict=True):
+        assert a.tobytes() == b.tobytes()
 
 
 def corners(world: World) -> tuple[Floats, Floats]:
     """Least and greatest corner of each obstacle."""
     d, balls, boxes = world.dim, world.balls, world.boxes
-    least = np.concatenate([balls[:, :d] - balls[:, d:], boxes[:, :d]])
-    return least, np.concatenate([balls[:, :d] + balls[:, d:], boxes[:, d:]])
+    least, most = [balls[:, :d] - balls[:, d:], boxes[:, :d]], [balls[:, :d] + balls[:, d:]]
+    most.append(boxes[:, d:])
+    for polygon in world.polygons:
+        least.append(polygon.min(axis=0, keepdims=True))
+        most.append(polygon.max(axis=0, keepdims=True))
+    return np.concatenate(least), np.concatenate(most)
 
 
 def refused(action: Callable[[], object]) -> str:
@@ -61,7 +68,8 @@ def test_obstacles_are_as_asked(name: str, n: int, seed: int, size: float) -> No
     world = make_world(f"{name}:n={n},seed={seed},size={size!r},{sizes(name, size)}")
     d = world.dim
     assert d == (3 if name.endswith("3d") else 2)
-    assert (len(world.balls), len(world.boxes)) == ((n, 0) if name in BALLS else (0, n))
+    counts = (len(world.balls), len(world.boxes), len(world.polygons))
+    assert counts == tuple(n * (name in kind) for kind in (BALLS, BOXES, POLYGONS))
     assert (world.lower == 0).all()
     assert (world.upper == size).all()
     least, most = corners(world)
@@ -70,12 +78,15 @@ def test_obstacles_are_as_asked(name: str, n: int, seed: int, size: float) -> No
     if name in BALLS:
         radii = world.balls[:, d]
         assert ((0.01 * size <= radii) & (radii <= 0.08 * size)).all()
-    else:
+    elif name in BOXES:
         sides = world.boxes[:, d:] - world.boxes[:, :d]
         assert (sides >= 0.02 * size * (1 - 1e-9)).all()
         assert (sides <= 0.15 * size * (1 + 1e-9)).all()
         if name == "squares2d":
             np.testing.assert_allclose(sides[:, 0], sides[:, 1], atol=ULPS * size)
+    else:
+        assert all(3 <= len(polygon) <= 7 for polygon in world.polygons)
+        assert (most - least <= 0.16 * size * (1 + 1e-9)).all()
     for part, end in ((0.05, world.start), (0.95, world.goal)):
         assert end is not None
         assert (end == part * size).all()
@@ -84,7 +95,7 @@ def test_obstacles_are_as_asked(name: str, n: int, seed: int, size: float) -> No
 
 def sizes(name: str, size: float) -> str:
     """Sizes of obstacles in proportion to the map, as parameters."""
-    if name in BALLS:
+    if name not in BOXES:
         return f"min_radius={0.01 * size!r},max_radius={0.08 * size!r}"
     return f"min_side={0.02 * size!r},max_side={0.15 * size!r}"
 
@@ -96,9 +107,7 @@ def test_seeded(name: str) -> None:
     assert_same(one, make_world(f"{name}:seed=7,n=20"))
     assert_same(make_world(name), make_world(f"{name}:seed=0"))
     other = make_world(f"{name}:n=20,seed=8")
-    assert (
-        one.balls.tobytes() + one.boxes.tobytes() != other.balls.tobytes() + other.boxes.tobytes()
-    )
+    assert one.to_json() != other.to_json().replace("seed=8", "seed=7")
 
 
 @EVERY
@@ -210,9 +219,9 @@ def worlds(draw: st.DrawFn) -> World:
     box = st.tuples(point, point).map(lambda it: np.sort(it, axis=0).ravel())
     low, high = np.sort([draw(point), draw(point)], axis=0)
     high = np.maximum(high, np.nextafter(low, np.inf))
-    ends = [draw(st.none() | point.map(np.array)) for _ in range(2)]
+    start, goal = (draw(st.none() | point.map(np.array)) for _ in range(2))
     balls, boxes = draw(st.lists(ball, max_size=3)), draw(st.lists(box, max_size=3))
-    return World("w", low, high, np.array(balls), np.array(boxes), *ends)
+    return World("w", low, high, np.array(balls), np.array(boxes), start, goal)
 
 
 @given(worlds())
@@ -496,3 +505,78 @@ def test_real_maps(name: str, count: int | None, upper: list[float] | None) -> N
         assert world.inside(end)
         assert world.obstacle_at(end) is None
     assert_same(world, World.from_json(world.to_json()))
+
+
+# Polygons
+
+
+def polygon_world(*polygons: object) -> World:
+    """A square world with polygons."""
+    return World("w", np.zeros(2), np.full(2, 9.0), polygons=polygons)  # type: ignore[arg-type]
+
+
+def test_polygons_are_brought_in_order() -> None:
+    """Counter-clockwise, without vertices that repeat or lie on an edge; and that stays so."""
+    world = polygon_world(
+        [[1, 1], [1, 3], [2, 3], [3, 3], [3, 3], [3, 1]], [[5, 5], [6, 5]], [[5, 5], [6, 5], [5, 5]]
+    )
+    square, line, same_line = world.polygons
+    assert len(square) == 4
+    assert {tuple(p) for p in square.tolist()} == {(1, 1), (3, 1), (3, 3), (1, 3)}
+    after = np.roll(square, -1, axis=0)
+    assert (square[:, 0] * after[:, 1] - square[:, 1] * after[:, 0]).sum() > 0
+    assert line.tolist() == same_line.tolist()[::-1] or line.tolist() == same_line.tolist()
+    assert_same(world, World.from_json(world.to_json()))
+
+
+@pytest.mark.parametrize(
+    ("polygon", "message"),
+    [
+        ([[0, 0]], "polygons[0] must be 2 or more vertices"),
+        ([[0, 0, 0], [1, 0, 0]], "each a pair of numbers"),
+        ([[0, 0], [0, 0]], "2 or more different vertices"),
+        ([[0, 0], [4, 0], [1, 1], [0, 4]], "is not convex at (1, 1); split it"),
+        ([[0, 0], [2, 2], [2, 0], [0, 2]], "is not convex"),
+        ([[0, 3], [2, -3], [-3, 1], [3, 1], [-2, -3]], "is not convex"),
+        ([[0, 0], [1, 1], [2, 2]], "has no area; give a line segment"),
+        ([[0, 0], [1, float("nan")]], "finite numbers"),
+        ([[0, 0], [1, 1e101]], "up to 1e+100"),
+        ("line", "must be 2 or more vertices"),
+    ],
+)
+def test_bad_polygons(polygon: object, message: str) -> None:
+    """One line that names the polygon and the remedy."""
+    assert message in refused(lambda: polygon_world(polygon))
+
+
+def test_polygons_are_for_the_plane() -> None:
+    """A 3D world has none."""
+    corner = [[0, 0], [1, 0], [0, 1]]
+    flat, cube = (np.zeros(2), np.ones(2)), (np.zeros(3), np.ones(3))
+    why = refused(lambda: World("w", *cube, polygons=(np.array(corner),)))
+    assert "polygons stand in the plane, and this world is 3D" in why
+    why = refused(lambda: World("w", *flat, polygons=3))  # type: ignore[arg-type]
+    assert "polygons must be a list" in why
+
+
+def test_closed_polygons() -> None:
+    """A point on an edge, a corner or a line segment touches it."""
+    world = polygon_world([[1, 1], [3, 1], [1, 3]], [[5, 5], [7, 7]])
+    for p in ([1, 1], [2, 2], [2, 1], [1.2, 1.2]):
+        assert "polygon 0" in str(world.obstacle_at(p))
+    for p in ([5, 5], [6, 6], [7, 7]):
+        assert "polygon 1" in str(world.obstacle_at(p))
+    for p in ([2.01, 2.01], [0.99, 1], [4.99, 4.99], [7.01, 7.01], [6, 6.01]):
+        assert world.obstacle_at(p) is None
+
+
+def test_a_body_touches_obstacles_of_every_kind() -> None:
+    """`obstacle_touching` names what a square touches."""
+    square = np.array([[4.0, 4.0], [5.0, 4.0], [5.0, 5.0], [4.0, 5.0]])
+    for gap, touches in ((0.0, True), (1e-6, False)):
+        ball = World("w", np.zeros(2), np.full(2, 9.0), [[5 + gap + 0.6, 5.8, 1.0]])  # type: ignore[arg-type]
+        box = World("w", np.zeros(2), np.full(2, 9.0), boxes=[[5 + gap, 0.0, 6.0, 4.5]])  # type: ignore[arg-type]
+        line = polygon_world([[5 + gap, 0], [5 + gap, 9]])
+        assert (ball.obstacle_touching(square) is not None) == touches
+        assert (box.obstacle_touching(square) is not None) == touches
+        assert (line.obstacle_touching(square) is not None) == touches

@@ -1,11 +1,12 @@
 """Broad phase: which obstacles may a segment meet? A uniform grid, walked cell by cell."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 
-from brrt.kernels.jit import inlined
+from brrt.kernels.jit import BORROWING, borrowing, inlined
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -26,7 +27,7 @@ _TINY = 1e-290
 
 
 class Obstacles(NamedTuple):
-    """Balls and boxes behind a grid.
+    """Balls, boxes and convex polygons behind a grid.
 
     The tuples have one number an axis, so that kernels are compiled for the dimension.
 
@@ -36,9 +37,11 @@ class Obstacles(NamedTuple):
         per_length: Their reciprocals.
         shape: Cells along each axis.
         starts: Where each cell's entries begin in `items`, shape (cells + 1,).
-        items: Obstacle numbers: balls first, then boxes.
+        items: Obstacle numbers: balls first, then boxes, then polygons.
         balls: Centre and radius, shape (n, d + 1).
         boxes: Least corner and greatest corner, shape (m, 2 d).
+        vertices: Vertices of all polygons, counter-clockwise, shape (v, 2).
+        corners: Where each polygon begins in `vertices`, and the end; shape (k + 1,).
     """
 
     lower: tuple[float, ...]
@@ -49,13 +52,24 @@ class Obstacles(NamedTuple):
     items: NDArray[np.int32]
     balls: Floats
     boxes: Floats
+    vertices: Floats
+    corners: NDArray[np.int32]
+
+
+def bounding_boxes(world: World) -> tuple[Floats, Floats]:
+    """Least and greatest corners of balls, boxes and polygons, shape (n, d) each."""
+    d, balls, boxes = world.dim, world.balls, world.boxes
+    least, most = [balls[:, :d] - balls[:, d:], boxes[:, :d]], [balls[:, :d] + balls[:, d:]]
+    most += [boxes[:, d:]]
+    least += [polygon.min(axis=0, keepdims=True) for polygon in world.polygons]
+    most += [polygon.max(axis=0, keepdims=True) for polygon in world.polygons]
+    return np.concatenate(least), np.concatenate(most)
 
 
 def build_obstacles(world: World) -> Obstacles:
     """Enter a world's obstacles into a grid, about 8 cells an obstacle."""
-    d, balls, boxes = world.dim, world.balls, world.boxes
-    least = np.concatenate([balls[:, :d] - balls[:, d:], boxes[:, :d]])
-    most = np.concatenate([balls[:, :d] + balls[:, d:], boxes[:, d:]])
+    d = world.dim
+    least, most = bounding_boxes(world)
     extent = world.upper - world.lower
     longest = float(extent.max())
     volume = float((extent / longest).prod()) / max(1.0, _CELLS_PER_OBSTACLE * len(least))
@@ -78,7 +92,20 @@ def build_obstacles(world: World) -> Obstacles:
     starts, items = _entries(first.astype(np.int64), spans, shape)
     corner, edges, counts = (tuple(a.tolist()) for a in (world.lower, cell, shape))
     per_length = tuple((1.0 / cell).tolist())
-    return Obstacles(corner, edges, per_length, counts, starts, items, balls, boxes)
+    ends = np.cumsum([0, *map(len, world.polygons)], dtype=np.int32)
+    vertices = np.concatenate([np.empty((0, 2)), *world.polygons])
+    return Obstacles(
+        corner,
+        edges,
+        per_length,
+        counts,
+        starts,
+        items,
+        world.balls,
+        world.boxes,
+        vertices,
+        ends,
+    )
 
 
 def _entries(
@@ -137,11 +164,69 @@ def _hits_slab(
     return min(u, v), max(u, v)
 
 
+@borrowing
+def _hits_hull(
+    vertices: Floats, first: int, end: int, ax: float, ay: float, dx: float, dy: float
+) -> bool:
+    """Whether the segment from (ax, ay) along (dx, dy) touches a convex polygon.
+
+    A line that separates the two runs along one of them (separating axes). Coordinates count from
+    a vertex or from the segment's first end, so each difference rounds once; a cross product of
+    two rounds by less than 1e-15 of its terms, and what is not apart by more is a hit.
+    """
+    left, right, behind, beyond = True, True, True, True
+    square = dx * dx + dy * dy
+    for v in range(first, end):
+        px, py = vertices[v, 0] - ax, vertices[v, 1] - ay
+        across, slack = dx * py - dy * px, 1e-15 * (abs(dx * py) + abs(dy * px))
+        left, right = left and across > slack, right and across < -slack
+        along, slack = dx * px + dy * py, 1e-15 * (abs(dx * px) + abs(dy * py) + square)
+        behind, beyond = behind and along < -slack, beyond and along > square + slack
+    if left or right or behind or beyond:
+        return False
+    before = end - 1
+    for v in range(first, end):
+        ux, uy = vertices[before, 0], vertices[before, 1]
+        ex, ey = vertices[v, 0] - ux, vertices[v, 1] - uy
+        px, py = ax - ux, ay - uy
+        slack = 3e-15 * (abs(ex) * (abs(py) + abs(dy)) + abs(ey) * (abs(px) + abs(dx)))
+        start = ex * py - ey * px
+        if max(start, start + (ex * dy - ey * dx)) < -slack:
+            return False
+        if end - first == 2:
+            # Past the end of a line segment its own direction is what separates.
+            slack = 3e-15 * (abs(ex) * (abs(px) + abs(dx)) + abs(ey) * (abs(py) + abs(dy)))
+            start = ex * px + ey * py
+            if max(start, start + (ex * dx + ey * dy)) < -slack:
+                return False
+        before = v
+    return True
+
+
+def _hits_polygon(o: Obstacles, polygon: int, line: tuple[float, float, float, float]) -> bool:
+    """Whether the segment from (ax, ay) along (dx, dy) touches a polygon of a 2D world."""
+    ax, ay, dx, dy = line
+    return _hits_hull(o.vertices, o.corners[polygon], o.corners[polygon + 1], ax, ay, dx, dy)
+
+
+@overload(_hits_polygon, strict=False, jit_options=BORROWING)  # type: ignore[arg-type]
+def _by_dimension(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
+    """Compile the test for polygons in 2D alone; 3D knows none."""
+    if len(o.types[0]) == 2:
+        return _hits_polygon
+
+    def never(o: Any, polygon: Any, line: Any) -> bool:  # noqa: ARG001
+        return False
+
+    return never
+
+
 @inlined
 def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the closed segment from A[i] to B[j] touches an obstacle.
 
-    Decided by formulas, not by sampling: slabs for boxes, the closest point for balls. Rounding
+    Decided by formulas, not by sampling: slabs for boxes, the closest point for balls, separating
+    axes for polygons. Rounding
     only ever turns a miss by less than about 1e-15 of the lengths at hand into a hit.
 
     Args:
@@ -153,6 +238,7 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
     """
     d = len(o.lower)
     n_balls = o.balls.shape[0]
+    n_round_or_box = n_balls + o.boxes.shape[0]
     ax, ay, az = A[i, 0], A[i, 1], 0.0
     dx, dy, dz = B[j, 0] - ax, B[j, 1] - ay, 0.0
     nx, ny = o.shape[0], o.shape[1]
@@ -191,7 +277,7 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
                     px, py, pz = px + u * dx, py + u * dy, pz + u * dz
                 if px * px + py * py + pz * pz <= reach * reach:
                     return True
-            else:
+            elif item < n_round_or_box:
                 box = item - n_balls
                 enter, leave = _hits_slab(ax, dx, ix, o.boxes[box, 0], o.boxes[box, d])
                 low, high = _hits_slab(ay, dy, iy, o.boxes[box, 1], o.boxes[box, d + 1])
@@ -201,6 +287,8 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
                     enter, leave = max(enter, low), min(leave, high)
                 if max(enter, 0.0) <= min(leave, 1.0) + _SLACK:
                     return True
+            elif _hits_polygon(o, item - n_round_or_box, (ax, ay, dx, dy)):
+                return True
         if next_x <= next_y and next_x <= next_z:
             if next_x > 1.0:
                 return False

@@ -85,10 +85,10 @@ def inlined(fn: F) -> F:
 
 def borrowing(fn: F) -> F:
     """Compile `fn` as `inlined` does, but only once: for what is long or seldom called."""
-    return _compiled(fn, _BORROWING)
+    return _compiled(fn, BORROWING)
 
 
-_BORROWING: dict[str, Any] = {
+BORROWING: dict[str, Any] = {
     "_nrt": False,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
@@ -99,7 +99,7 @@ _BORROWING: dict[str, Any] = {
 that is most of the time. So what a kernel calls borrows its arguments, and neither makes nor keeps
 an array. Without the wrappers for Python it compiles in two thirds of the time."""
 
-INLINED: dict[str, Any] = {**_BORROWING, "forceinline": True}
+INLINED: dict[str, Any] = {**BORROWING, "forceinline": True}
 
 
 def _compiled(fn: F, options: dict[str, Any]) -> F:

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _by_robot(function: F, default: Any = None) -> F:
+def by_robot(function: F, default: Any = None) -> F:
     """Let kernels that call `function` get the kernel of that name from the space's class.
 
     Args:
@@ -38,25 +38,25 @@ def _by_robot(function: F, default: Any = None) -> F:
     return function
 
 
-@_by_robot
+@by_robot
 def measure(space: Any, A: Floats, i: int, B: Floats, j: int) -> float:
     """Return a number that grows with the distance of A[i] and B[j] and is cheap to compare."""
     return float(space.measure(space, A, i, B, j))
 
 
-@_by_robot
+@by_robot
 def length(space: Any, measured: float) -> float:
     """Return the distance that a `measure` stands for."""
     return float(space.length(space, measured))
 
 
-@_by_robot
+@by_robot
 def box_measure(space: Any, boxes: Floats, b: int, Q: Floats, i: int) -> float:
     """Return a lower bound of `measure` from Q[i] to anything in boxes[b]: least, then greatest."""
     return float(space.box_measure(space, boxes, b, Q, i))
 
 
-@_by_robot
+@by_robot
 def interpolate(
     space: Any,
     A: Floats,
@@ -71,7 +71,7 @@ def interpolate(
     space.interpolate(space, A, i, B, j, part, out, row)
 
 
-@_by_robot
+@by_robot
 def segment_free(space: Any, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the motion from A[i] to B[j] is free of collisions, ends included."""
     return bool(space.segment_free(space, A, i, B, j))
@@ -149,4 +149,4 @@ def sample_informed(
     own(space, rng, ends, start, goal, best, out, row)
 
 
-_by_robot(sample_informed, _sample_by_rejection)
+by_robot(sample_informed, _sample_by_rejection)

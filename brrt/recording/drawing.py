@@ -59,6 +59,7 @@ class Drawing:
 
     def __init__(self, rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
         self._rec, self._world, self._dim = rec, world, manifest.dim
+        self._robot = manifest.make_robot()
         flat = scene.is_flat(manifest)
         self._lines: Any = rr.LineStrips2D if flat else rr.LineStrips3D
         self._points: Any = rr.Points2D if flat else rr.Points3D
@@ -120,7 +121,7 @@ class Drawing:
         for number in np.unique(table["tree"]).tolist():
             name, colour = scene.tree_style(number)
             if number not in self._trees:
-                self._trees[number] = TreeSketch(self._world)
+                self._trees[number] = TreeSketch(self._world, self._robot)
                 self._style(f"/world/tree/{name}", self._lines, colour, -0.75, 20.0)
                 self._plot_style(f"/series/nodes/{name}", f"{name} tree", colour)
             tree, mine = self._trees[number], table["tree"] == number
@@ -142,7 +143,7 @@ class Drawing:
             which = np.flatnonzero(table["source"] == source)
             rows = self._fading(table, which, f"{_label(source)} samples")
             if len(rows):
-                points = self._points.columns(positions=scene.places(rows["q"], self._dim))
+                points = self._points.columns(positions=scene.places(rows["q"], self._robot))
                 self._send(f"/world/samples/{_label(source)}", rows, _even_rows(len(rows)), points)
 
     def _draw_rejects(self, table: Table, edges: Table) -> None:
@@ -163,7 +164,7 @@ class Drawing:
         for number, tree in self._trees.items():
             mine = rejects["tree"] == number
             ends[mine, 0] = tree.places(rejects["node"][mine])
-        ends[:, 1] = scene.places(rejects["q"], self._dim)
+        ends[:, 1] = scene.places(rejects["q"], self._robot)
         return ends.reshape(-1, self._dim)
 
     def _plot_rejects(
@@ -206,7 +207,7 @@ class Drawing:
                 self._path = np.delete(self._path, slice(event["i"] + 1, event["j"]), axis=0)
             if self._path is not None and (stage is not None or len(self._path) <= _LONGEST_SHOWN):
                 shown = Stage.SMOOTHED if stage is None else stage
-                drawn.setdefault(shown, []).append((event, scene.places(self._path, self._dim)))
+                drawn.setdefault(shown, []).append((event, scene.places(self._path, self._robot)))
         for stage, items in drawn.items():
             places = [place for _, place in items]
             strips = line_strips(np.concatenate(places), [len(place) for place in places])

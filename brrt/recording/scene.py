@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Stage
+from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds.world import World
 
@@ -60,9 +61,9 @@ def path_style(stage: Stage) -> tuple[str, Colour, float]:
     return (stage.name.lower(), *_PATHS.get(stage, (OTHER, 2.0)))
 
 
-def places(values: Any, dim: int) -> NDArray[np.float32]:
-    """Where configurations are, shape (n, dim): the first coordinates of a robot are its place."""
-    return np.ascontiguousarray(np.asarray(values)[..., :dim], np.float32)
+def places(values: Any, robot: Robot) -> NDArray[np.float32]:
+    """Where configurations, shape (n, dof), are drawn, shape (n, dim)."""
+    return np.ascontiguousarray(robot.places(np.asarray(values, np.float64)), np.float32)
 
 
 def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
@@ -73,9 +74,14 @@ def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None
     still = _still_2d(world) if is_flat(manifest) else _still_3d(world)
     for entity, archetype in still.items():
         rec.log(entity, archetype, static=True)
+    robot = manifest.make_robot()
     marks = (("start", manifest.start, START), ("goal", manifest.goal, GOAL))
     for name, q, colour in marks:
-        place = places([q], manifest.dim)
+        place = places([q], robot)
+        body = [np.concatenate([part, part[:1]]) for part in robot.outline(np.array(q))]
+        if body:
+            outline = rr.LineStrips2D(body, colors=colour, radii=-1.5, draw_order=90)
+            rec.log(f"/world/{name}/body", outline, static=True)
         rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
         # Rerun writes a label across its point; this one stands below.
         below = (
@@ -112,6 +118,8 @@ def _still_2d(world: World) -> dict[str, Any]:
         )
     if len(world.boxes):
         still["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
+    if world.polygons:
+        still["/world/obstacles/polygons"] = _filled_polygons(world.polygons)
     return still
 
 
@@ -136,6 +144,29 @@ def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.
         colors=OBSTACLE,
         draw_order=0,
     )
+
+
+def _filled_polygons(polygons: tuple[NDArray[np.float64], ...]) -> rr.LineStrips2D:
+    """Polygons of thick lines nested in each other, and an edge, as `_filled_boxes`.
+
+    Each line is the outline moved inwards: towards the middle, so far that it stays within.
+    """
+    strips, radii = list[NDArray[np.float64]](), list[float]()
+    for polygon in polygons:
+        closed = np.concatenate([polygon, polygon[:1]])
+        if len(polygon) > 2:
+            middle = polygon.mean(axis=0)
+            along, offset = np.diff(closed, axis=0), polygon - middle
+            heights = offset[:, 0] * along[:, 1] - offset[:, 1] * along[:, 0]
+            inner = float((heights / np.hypot(*along.T)).min())
+            radius = inner / (1 + _OVERLAP * (_LAYERS - 1))
+            for layer in range(_LAYERS):
+                inset = (1 + _OVERLAP * layer) * radius
+                strips.append(middle + (closed - middle) * max(1 - inset / inner, 0.0))
+                radii.append(radius)
+        strips.append(closed)
+        radii.append(-0.5 if len(polygon) > 2 else -1.5)
+    return rr.LineStrips2D(strips, radii=radii, colors=OBSTACLE, draw_order=0)
 
 
 def _still_3d(world: World) -> dict[str, Any]:

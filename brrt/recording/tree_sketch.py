@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Table
 from brrt.recording.scene import places
+from brrt.robots import Robot
 from brrt.worlds.world import World
 
 DRAWN_IN_FULL = 50_000
@@ -24,13 +25,15 @@ class TreeSketch:
 
     Args:
         world: Where it grows.
+        robot: What moves there.
 
     Attributes:
         nodes: Nodes that have joined.
         drawn: Edges that were worth drawing.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, robot: Robot) -> None:
+        self._robot = robot
         self.nodes, self.drawn = 0, 0
         self._places = np.full((1024, world.dim), np.nan, np.float32)
         side = int(_CELLS ** (1 / world.dim))
@@ -45,10 +48,10 @@ class TreeSketch:
             Both ends of each line to draw, one after the other, shape (2 n, dim); and which
             edges these are, shape (n,).
         """
-        ends = places(rows["q"], len(self._grid))
+        ends = places(rows["q"], self._robot)
         self._keep(rows["node"], ends)
         wanted = rows["parent"] >= 0
-        cells = self._cells_of(rows["q"])
+        cells = self._cells_of(self._robot.places(rows["q"]))
         number = np.arange(self.nodes, self.nodes + len(rows))
         if number[-1] >= DRAWN_IN_FULL:
             first_in_cell = np.zeros(len(rows), np.bool_)
@@ -76,8 +79,7 @@ class TreeSketch:
             self._places = np.concatenate([self._places, more])
         self._places[nodes] = ends
 
-    def _cells_of(self, q: NDArray[np.float64]) -> NDArray[np.int64]:
-        dim = len(self._grid)
-        steps = ((q[:, :dim] - self._lower) * self._scale).astype(np.int64)
+    def _cells_of(self, positions: NDArray[np.float64]) -> NDArray[np.int64]:
+        steps = ((positions - self._lower) * self._scale).astype(np.int64)
         cells: NDArray[np.int64] = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
         return cells

@@ -1,9 +1,95 @@
 """Robots: one file and one line here adds one."""
 
+import json
 from collections.abc import Mapping
+from pathlib import Path
 
+from brrt.errors import BrrtError, unknown
+from brrt.robots.chain import Chain
 from brrt.robots.point import Point
+from brrt.robots.polygon import Polygon
+from brrt.robots.robot import SCHEMA, VERSION, Robot
+from brrt.settings import pairs
 
-ROBOTS: Mapping[str, type[Point]] = {"point": Point}
+ROBOTS: Mapping[str, type[Robot]] = {"point": Point, "polygon": Polygon, "chain": Chain}
 
-__all__ = ["ROBOTS", "Point"]
+_MAX_BYTES = 16_000_000
+
+
+def make_robot(spec: str) -> Robot:
+    """Make the robot that a user names.
+
+    Args:
+        spec: A name with parameters, such as `polygon:length=4,width=2`, or a JSON file.
+
+    Raises:
+        BrrtError: There is no such robot, or it is not usable.
+    """
+    if names_robot_file(spec):
+        return load_robot(Path(spec))
+    name, _, rest = spec.partition(":")
+    if name not in ROBOTS:
+        raise unknown("robot", name, ROBOTS)
+    return ROBOTS[name].parse(f"robot {name}", pairs(f"robot {spec}", rest))
+
+
+def names_robot_file(spec: str) -> bool:
+    """Whether a user means a file: it may be missing by now."""
+    if spec.partition(":")[0] in ROBOTS:
+        return False
+    return spec.endswith(".json") or "/" in spec or (bool(spec) and Path(spec).is_file())
+
+
+def load_robot(path: Path) -> Robot:
+    """Read a robot from a JSON file.
+
+    Raises:
+        BrrtError: The file cannot be read, or is not a robot.
+    """
+    try:
+        size = path.stat().st_size
+        if size > _MAX_BYTES:
+            raise BrrtError(f"{path}: {size:,} bytes are too many; a robot has {_MAX_BYTES:,}")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise BrrtError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise BrrtError(f"{path}: not a text file") from None
+    try:
+        return robot_from_json(text)
+    except BrrtError as error:
+        raise BrrtError(f"{path}: {error}") from None
+
+
+def robot_from_json(text: str) -> Robot:
+    """Read what `Robot.to_json` wrote.
+
+    Raises:
+        BrrtError: The text is not such a robot.
+    """
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BrrtError(f"not a JSON robot: {error}") from None
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise BrrtError(f'not a brrt robot: the field "schema" must be "{SCHEMA}"')
+    if data.get("version") != VERSION:
+        raise BrrtError(f"robot version {data.get('version')!r} is not {VERSION}; update brrt")
+    kind = data.get("kind")
+    if not isinstance(kind, str) or kind not in ROBOTS:
+        raise unknown("kind of robot", str(kind), ROBOTS)
+    known = ("schema", "version", "kind", "name")
+    return ROBOTS[kind].from_definition({k: v for k, v in data.items() if k not in known})
+
+
+__all__ = [
+    "ROBOTS",
+    "Chain",
+    "Point",
+    "Polygon",
+    "Robot",
+    "load_robot",
+    "make_robot",
+    "names_robot_file",
+    "robot_from_json",
+]

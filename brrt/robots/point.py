@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
 from brrt.kernels.jit import inlined
 from brrt.kernels.random import Random, uniform
-from brrt.settings import Settings
+from brrt.robots.robot import Robot
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -141,33 +141,55 @@ def _sample_unit_ball(rng: Random, d: int, out: Floats, row: int) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Point(Settings):
-    """A point robot; its configuration is its position."""
+class Point(Robot):
+    """A point in the plane or in space; its configuration is its position."""
 
-    def dof(self, world: World) -> int:
-        """Numbers in a configuration: the world's dimension."""
-        return world.dim
+    kind: ClassVar[str] = "point"
+
+    def coordinates(self, world: World) -> tuple[str, ...]:
+        """As many as the world has dimensions."""
+        return ("x", "y", "z")[: world.dim]
 
     def space(self, world: World) -> PointSpace:
-        """Put the robot into a world."""
+        """See `Robot.space`."""
         lower, upper = tuple(world.lower.tolist()), tuple(world.upper.tolist())
         return PointSpace(lower, upper, build_obstacles(world))
 
-    def unit_ball_volume(self, world: World) -> float:
-        """Area of the unit circle or volume of the unit sphere."""
-        return math.pi if world.dim == 2 else 4 / 3 * math.pi
-
     def collision(self, world: World, q: Floats) -> str | None:
-        """Say why a configuration, shape (d,), is not free, or return None."""
+        """See `Robot.collision`."""
         if not world.inside(q):
             return "is outside the bounds"
         hit = world.obstacle_at(q)
         return hit and f"is in collision with {hit}"
 
     def distance(self, a: Floats, b: Floats) -> Floats:
-        """Distances between configurations, shape (..., d)."""
+        """See `Robot.distance`."""
         squares = (np.asarray(b) - np.asarray(a)) ** 2
         total = squares[..., 0]
         for k in range(1, squares.shape[-1]):
             total = total + squares[..., k]
         return np.asarray(np.sqrt(total))
+
+    def interpolate(self, a: Floats, b: Floats, part: Floats | float) -> Floats:
+        """See `Robot.interpolate`."""
+        return np.asarray(a + (b - a) * np.asarray(part)[..., None])
+
+    def unit_ball_volume(self, world: World) -> float:
+        """A disc or a ball."""
+        return math.pi if world.dim == 2 else 4 / 3 * math.pi
+
+    def places(self, Q: Floats) -> Floats:
+        """Where it is."""
+        return Q
+
+    def outline(self, q: Floats) -> list[Floats]:  # noqa: ARG002
+        """Nothing: a point has no parts."""
+        return []
+
+    def configuration(self, position: Floats) -> Floats:
+        """Return the position."""
+        return position
+
+    def position(self, q: Floats) -> Floats:
+        """Return the configuration."""
+        return q

@@ -1,18 +1,21 @@
 """Worlds: a generator is one class and one line here, a file format one function and one line."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
+from brrt.settings import pairs
 from brrt.worlds.blocks import load_blocks
 from brrt.worlds.generators import (
     Boxes2D,
     Boxes3D,
     Circles2D,
     Generator,
+    Polygons2D,
     Spheres3D,
     Squares2D,
 )
@@ -23,6 +26,7 @@ GENERATORS: Mapping[str, type[Generator]] = {
     "circles2d": Circles2D,
     "squares2d": Squares2D,
     "boxes2d": Boxes2D,
+    "polygons2d": Polygons2D,
     "boxes3d": Boxes3D,
     "spheres3d": Spheres3D,
 }
@@ -41,6 +45,7 @@ def make_world(
     spec: str,
     start: NDArray[np.float64] | None = None,
     goal: NDArray[np.float64] | None = None,
+    room: float = 0.0,
 ) -> World:
     """Make the world that a user names.
 
@@ -48,14 +53,15 @@ def make_world(
         spec: A generator with parameters, such as `circles2d:n=50,max_radius=5`, or a file.
         start: Point that a generator keeps free, shape (d,).
         goal: Another.
+        room: Distance to keep free around them, beyond a generator's own clearance.
 
     Raises:
         BrrtError: There is no such world, or it is not usable.
     """
     name, _, rest = spec.partition(":")
     if name in GENERATORS:
-        settings = GENERATORS[name].parse(f"world {name}", _pairs(spec, rest))
-        return settings.make(spec, start, goal)
+        settings = GENERATORS[name].parse(f"world {name}", pairs(f"world {spec}", rest))
+        return settings.make(spec, start, goal, room)
     path = Path(spec)
     if not spec:
         raise unknown("world", spec, GENERATORS)
@@ -93,17 +99,7 @@ def load_world(path: Path) -> World:
 
 
 def _named(name: str, world: World) -> World:
-    return World(name, world.lower, world.upper, world.balls, world.boxes, world.start, world.goal)
-
-
-def _pairs(spec: str, text: str) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for part in filter(None, text.split(",")):
-        key, equals, value = part.partition("=")
-        if not equals:
-            raise BrrtError(f"world {spec}: {part!r} must read name=value")
-        pairs[key.strip()] = value.strip()
-    return pairs
+    return replace(world, name=name)
 
 
 __all__ = ["GENERATORS", "LOADERS", "Generator", "World", "load_world", "make_world"]

@@ -1,8 +1,8 @@
-"""Worlds drawn from a seed: circles, squares and boxes in 2D, spheres and boxes in 3D."""
+"""Worlds drawn from a seed: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,34 +33,45 @@ class Generator(Settings):
 
     @abstractmethod
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
-        """Draw n obstacles: centres, shape (n, d), and half extents along each axis."""
+        """Draw n obstacles: centres, shape (n, d), and half extents, or whatever is their shape."""
 
     @abstractmethod
-    def covers(self, centres: Floats, halves: Floats, point: Floats) -> NDArray[np.bool_]:
+    def covers(
+        self, centres: Floats, halves: Floats, point: Floats, clearance: float
+    ) -> NDArray[np.bool_]:
         """Whether each obstacle comes closer to a point than the clearance."""
 
     @abstractmethod
     def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
         """Make the world of the obstacles; `ends` are start and goal."""
 
-    def make(self, name: str, start: Floats | None = None, goal: Floats | None = None) -> World:
+    def make(
+        self,
+        name: str,
+        start: Floats | None = None,
+        goal: Floats | None = None,
+        room: float = 0.0,
+    ) -> World:
         """Make the world.
 
         Args:
             name: Its name.
             start: Point to keep free, shape (d,); 5 % of the size in each coordinate by default.
             goal: Another; 95 % by default.
+            room: Distance to keep free around them, beyond the clearance, for a robot's body.
 
         Raises:
             BrrtError: The obstacles are so large that they leave no room for start and goal.
         """
-        ends = [self._end(given, part) for given, part in ((start, 0.05), (goal, 0.95))]
+        clearance = _CLEARANCE * self.size + room
+        part = max(0.05, min(clearance / self.size, 0.5) if room else 0.0)
+        ends = [self._end(given, part) for given, part in ((start, part), (goal, 1 - part))]
         rng = np.random.default_rng(self.seed)
         centres, halves = self.draw(rng, self.n)
         for _ in range(_REDRAWS):
             bad = np.zeros(self.n, bool)
             for end in ends:
-                bad |= self.covers(centres, halves, end)
+                bad |= self.covers(centres, halves, end, clearance)
             count = int(bad.sum())
             if count == 0:
                 return self.place(name, centres, halves, ends)
@@ -79,10 +90,10 @@ class Generator(Settings):
     def _centres(self, rng: np.random.Generator, halves: Floats) -> Floats:
         return halves + (self.size - 2 * halves) * rng.random(halves.shape)
 
-    def _world(self, name: str, ends: list[Floats], *, balls: Floats, boxes: Floats) -> World:
+    def _world(self, name: str, ends: list[Floats], **obstacles: Any) -> World:
         lower, upper = np.zeros(self.dim), np.full(self.dim, self.size)
         start, goal = ends
-        return World(name, lower, upper, balls, boxes, start, goal)
+        return World(name, lower, upper, start=start, goal=goal, **obstacles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,15 +114,17 @@ class Balls(Generator):
         halves = np.repeat(radii[:, None], self.dim, axis=1)
         return self._centres(rng, halves), halves
 
-    def covers(self, centres: Floats, halves: Floats, point: Floats) -> NDArray[np.bool_]:
+    def covers(
+        self, centres: Floats, halves: Floats, point: Floats, clearance: float
+    ) -> NDArray[np.bool_]:
         """Compare the distance to the centre with radius and clearance."""
-        reach = halves[:, 0] + _CLEARANCE * self.size
+        reach = halves[:, 0] + clearance
         return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
     def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
         """Write each ball as centre and radius."""
         balls = np.concatenate([centres, halves[:, :1]], axis=1)
-        return self._world(name, ends, balls=balls, boxes=np.empty((0, 2 * self.dim)))
+        return self._world(name, ends, balls=balls)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,15 +148,17 @@ class Boxes(Generator):
         halves = np.array(np.broadcast_to(sides / 2, (n, self.dim)))
         return self._centres(rng, halves), halves
 
-    def covers(self, centres: Floats, halves: Floats, point: Floats) -> NDArray[np.bool_]:
+    def covers(
+        self, centres: Floats, halves: Floats, point: Floats, clearance: float
+    ) -> NDArray[np.bool_]:
         """Compare the offset along each axis with half side and clearance."""
-        near = np.abs(centres - point) <= halves + _CLEARANCE * self.size
+        near = np.abs(centres - point) <= halves + clearance
         return np.asarray(near.all(axis=1))
 
     def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
         """Write each box as its least and greatest corner."""
         boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-        return self._world(name, ends, balls=np.empty((0, self.dim + 1)), boxes=boxes)
+        return self._world(name, ends, boxes=boxes)
 
 
 def _check_sizes(what: str, least: float, greatest: float, limit: float) -> None:
@@ -187,3 +202,48 @@ class Spheres3D(Balls):
     """Spheres in a cube."""
 
     dim: ClassVar[int] = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Polygons2D(Generator):
+    """Convex polygons with their corners on circles, on a square map.
+
+    The corners are spread around the circle by 1 part each, give or take 0.3 parts.
+    """
+
+    dim: ClassVar[int] = 2
+
+    min_radius: float = param(1.0, "least circumscribed radius", above=0)
+    max_radius: float = param(8.0, "greatest circumscribed radius", above=0)
+    min_corners: int = param(3, "least number of corners", low=3, high=1000)
+    max_corners: int = param(7, "greatest number of corners", low=3, high=1000)
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        Generator.__post_init__(self)
+        _check_sizes("radius", self.min_radius, self.max_radius, self.size / 2)
+        _check_sizes("corners", self.min_corners, self.max_corners, np.inf)
+
+    def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
+        """Draw for each a row: radius, number of corners, angle of each corner."""
+        radii = rng.uniform(self.min_radius, self.max_radius, (n, 1))
+        corners = rng.integers(self.min_corners, self.max_corners + 1, (n, 1))
+        steps = np.arange(self.max_corners) + rng.uniform(-0.3, 0.3, (n, self.max_corners))
+        angles = 2 * np.pi * (rng.random((n, 1)) + steps / corners)
+        centres = self._centres(rng, np.repeat(radii, 2, axis=1))
+        return centres, np.concatenate([radii, corners, angles], axis=1)
+
+    def covers(
+        self, centres: Floats, halves: Floats, point: Floats, clearance: float
+    ) -> NDArray[np.bool_]:
+        """Compare the distance to the centre with radius and clearance."""
+        reach = halves[:, 0] + clearance
+        return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
+
+    def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
+        """Put the corners of each polygon on its circle."""
+        polygons = []
+        for centre, (radius, corners, *angles) in zip(centres, halves, strict=True):
+            around = np.array(angles[: int(corners)])
+            polygons.append(centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1))
+        return self._world(name, ends, polygons=tuple(polygons))

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.worlds.convex import GREATEST, convex_polygon, gap
 
 SCHEMA, VERSION = "brrt.world", 1
-_GREATEST = 1e100
-"""Kernels square coordinates; beyond this they could not decide."""
 Floats = NDArray[np.float64]
 
 
@@ -26,8 +25,8 @@ def _numbers_of(name: str, values: Any, what: str) -> Floats:
         raise BrrtError(f"world: {name} must be {what}") from None
     if not np.isfinite(array).all():
         raise BrrtError(f"world: {name} must hold finite numbers only")
-    if (np.abs(array) > _GREATEST).any():
-        raise BrrtError(f"world: {name} must hold numbers up to {_GREATEST:g} only")
+    if (np.abs(array) > GREATEST).any():
+        raise BrrtError(f"world: {name} must hold numbers up to {GREATEST:g} only")
     return array
 
 
@@ -48,6 +47,14 @@ def _rows(name: str, values: Any, width: int) -> Floats:
     return array
 
 
+def _polygons(values: Any, dim: int) -> tuple[Floats, ...]:
+    if not isinstance(values, list | tuple | np.ndarray):
+        raise BrrtError("world: polygons must be a list of polygons, each a list of vertices")
+    if len(values) and dim != 2:
+        raise BrrtError(f"world: polygons stand in the plane, and this world is {dim}D; use boxes")
+    return tuple(convex_polygon(f"world: polygons[{i}]", v) for i, v in enumerate(values))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class World:
     """Axis-aligned bounds in 2D or 3D with closed obstacles: touching one is a collision.
@@ -60,6 +67,8 @@ class World:
         boxes: Axis-aligned boxes, one a row: least corner, greatest corner; shape (m, 2 d).
         start: Suggested start position, shape (d,).
         goal: Suggested goal position, shape (d,).
+        polygons: Convex polygons, in 2D alone; vertices counter-clockwise, shape (k, 2) each. Two
+            vertices make a line segment.
 
     Raises:
         BrrtError: A shape is wrong, a number is not finite, or a minimum exceeds its maximum.
@@ -72,6 +81,7 @@ class World:
     boxes: Floats = field(default_factory=lambda: np.empty((0, 0)))
     start: Floats | None = None
     goal: Floats | None = None
+    polygons: tuple[Floats, ...] = ()
 
     def __post_init__(self) -> None:
         """Bring the arrays to float64 and check them."""
@@ -86,6 +96,7 @@ class World:
                 raise BrrtError(f"world: {name} must be {dim} numbers, not {len(end)}")
         for name, width in (("balls", dim + 1), ("boxes", 2 * dim)):
             object.__setattr__(self, name, _rows(name, getattr(self, name), width))
+        object.__setattr__(self, "polygons", _polygons(self.polygons, dim))
         if not (self.lower < self.upper).all():
             raise BrrtError("world: each upper bound must be above its lower bound")
         if (self.boxes[:, :dim] > self.boxes[:, dim:]).any():
@@ -119,6 +130,35 @@ class World:
         for i, ball in enumerate(self.balls):
             if math.dist(ball[:d], p) <= ball[d]:
                 return f"ball {i} (centre {_numbers(ball[:d])}, radius {ball[d]:g})"
+        return self._polygon_at(p[None]) if d == 2 else None
+
+    def obstacle_touching(self, shape: Floats) -> str | None:
+        """Name the first obstacle of a 2D world that touches a shape, or return None.
+
+        Args:
+            shape: A point, a line segment or a convex polygon, counter-clockwise; shape (k, 2).
+        """
+        least, most = shape.min(axis=0), shape.max(axis=0)
+        near = ((self.boxes[:, :2] <= most) & (least <= self.boxes[:, 2:])).all(axis=1)
+        for i in np.flatnonzero(near).tolist():
+            (a, b), (c, d) = self.boxes[i].reshape(2, 2)
+            corners = np.array([[a, b], [c, b], [c, d], [a, d]])
+            if gap(shape, np.unique(corners, axis=0) if a == c or b == d else corners) <= 0:
+                return f"box {i} ({_numbers(self.boxes[i, :2])} to {_numbers(self.boxes[i, 2:])})"
+        radii = self.balls[:, 2:]
+        near = ((self.balls[:, :2] - radii <= most) & (least <= self.balls[:, :2] + radii)).all(1)
+        for i in np.flatnonzero(near).tolist():
+            x, y, radius = self.balls[i]
+            if gap(shape, np.array([[x, y]])) <= radius:
+                return f"ball {i} (centre {x:g}, {y:g}, radius {radius:g})"
+        return self._polygon_at(shape)
+
+    def _polygon_at(self, shape: Floats) -> str | None:
+        least, most = shape.min(axis=0), shape.max(axis=0)
+        for i, polygon in enumerate(self.polygons):
+            apart = (polygon.max(axis=0) < least).any() or (most < polygon.min(axis=0)).any()
+            if not apart and gap(shape, polygon) <= 0:
+                return f"polygon {i} (about {_numbers(polygon.mean(axis=0))})"
         return None
 
     def to_json(self) -> str:
@@ -128,6 +168,8 @@ class World:
             value = getattr(self, name)
             if value is not None:
                 data[name] = value.tolist()
+        if self.polygons:
+            data["polygons"] = [polygon.tolist() for polygon in self.polygons]
         return json.dumps(data)
 
     @classmethod
@@ -145,7 +187,7 @@ class World:
             raise BrrtError(f'not a brrt world: the field "schema" must be "{SCHEMA}"')
         if data.get("version") != VERSION:
             raise BrrtError(f"world version {data.get('version')!r} is not {VERSION}; update brrt")
-        known = ("lower", "upper", "balls", "boxes", "start", "goal")
+        known = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons")
         for name in ("lower", "upper"):
             if name not in data:
                 raise BrrtError(f'not a whole brrt world: the field "{name}" is missing')

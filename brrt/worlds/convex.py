@@ -1,0 +1,129 @@
+"""Convex shapes in the plane, as numpy sees them: reading them, and how far apart they are."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+
+Floats = NDArray[np.float64]
+
+GREATEST = 1e100
+"""Kernels square coordinates; beyond this they could not decide."""
+
+_SLIGHTLY_BENT = 1e-9
+"""A vertex may lie this part of its edges inside the hull: rounding does that to written files."""
+
+
+def convex_polygon(name: str, values: Any) -> Floats:
+    """Read a convex polygon; two vertices make a line segment.
+
+    Vertices that repeat, or that lie on an edge, are left out.
+
+    Args:
+        name: What it is called in messages.
+        values: Vertices in either sense of rotation, shape (k, 2).
+
+    Returns:
+        The vertices counter-clockwise, shape (k, 2).
+
+    Raises:
+        BrrtError: It is not a convex polygon in the plane.
+    """
+    what = f"{name} must be 2 or more vertices, each a pair of numbers"
+    try:
+        vertices = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise BrrtError(what) from None
+    if vertices.ndim != 2 or vertices.shape[1] != 2 or len(vertices) < 2:
+        raise BrrtError(what)
+    if not (np.abs(vertices) <= GREATEST).all():
+        raise BrrtError(f"{name} must hold finite numbers up to {GREATEST:g} only")
+    vertices = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
+    if len(vertices) < 2:
+        raise BrrtError(f"{name} must have 2 or more different vertices; these are all the same")
+    return vertices if len(vertices) == 2 else _hull_of_convex(name, vertices)
+
+
+def _hull_of_convex(name: str, vertices: Floats) -> Floats:
+    """Check that a polygon is convex, up to rounding; return its hull, counter-clockwise."""
+    if _cross(vertices - vertices[0], np.roll(vertices, -1, axis=0) - vertices[0]).sum() < 0:
+        vertices = np.ascontiguousarray(vertices[::-1])
+    turns, lengths, angle = _turns(vertices)
+    bent = turns < -_SLIGHTLY_BENT * lengths
+    if bent.any() or abs(angle - 2 * np.pi) > 1:
+        at = vertices[int(turns.argmin())]
+        raise BrrtError(
+            f"{name} is not convex at ({at[0]:g}, {at[1]:g}); split it into convex polygons"
+        )
+    while len(vertices) > 2 and (turns <= 0).any():
+        vertices = np.delete(vertices, int(turns.argmin()), axis=0)
+        turns, _, _ = _turns(vertices)
+    if len(vertices) == 2:
+        raise BrrtError(f"{name} has no area; give a line segment as its two ends")
+    return vertices
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _turns(vertices: Floats) -> tuple[Floats, Floats, float]:
+    """At each vertex the cross and the lengths' product of its edges; the angle of all turns."""
+    after = np.roll(vertices, -1, axis=0) - vertices
+    before = np.roll(after, 1, axis=0)
+    cross = _cross(before, after)
+    angle = float(np.arctan2(cross, (before * after).sum(axis=1)).sum())
+    return cross, np.hypot(*before.T) * np.hypot(*after.T), angle
+
+
+def axes_of(vertices: Floats) -> Floats:
+    """Directions that decide whether something is apart from a shape, shape (m, 2), unit length.
+
+    The outward normals of a polygon, counter-clockwise; a line segment's normals and directions,
+    as if it were a rectangle; none for a point.
+    """
+    if len(vertices) < 2:
+        return np.empty((0, 2))
+    along = np.roll(vertices, -1, axis=0) - vertices
+    # Divided by the greatest component first: the squares of tiny ones would vanish.
+    along /= np.abs(along).max(axis=1, keepdims=True)
+    along /= np.hypot(*along.T)[:, None]
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    return np.concatenate([normals, along]) if len(vertices) == 2 else normals
+
+
+def gap(one: Floats, other: Floats) -> float:
+    """Lower bound of the distance between the hulls of two sets of vertices (separating axes).
+
+    Not above zero if they touch; exact, but for 2e-15 of the lengths at hand by which it errs on
+    the safe side, where a vertex faces an edge.
+
+    Args:
+        one: A point, a line segment or a convex polygon, counter-clockwise; shape (k, 2).
+        other: Another, shape (m, 2).
+    """
+    one, other = one - other[0], other - other[0]
+    axes = np.concatenate([axes_of(one), -axes_of(other)])
+    for point, shape in ((one, other), (other, one)):
+        if len(point) == 1:
+            # The nearest point of a shape may be a vertex, and then no edge shows the distance.
+            between = shape - point
+            nearest = between[np.hypot(*between.T).argmin()]
+            size = np.hypot(*nearest)
+            sign = 1 if point is one else -1
+            axes = np.concatenate([axes, [sign * nearest / size] if size else np.empty((0, 2))])
+    if len(axes) == 0:
+        return 0.0
+    apart = ((other @ axes.T).min(axis=0) - (one @ axes.T).max(axis=0)).max()
+    return float(apart - 2e-15 * max(np.abs(one).max(), np.abs(other).max()))
+
+
+def touching_pair(parts: list[Floats], apart: int) -> tuple[int, int] | None:
+    """Return the first two shapes that touch and are at least `apart` in the list, or None."""
+    for (i, one), (j, other) in itertools.combinations(enumerate(parts), 2):
+        if j - i >= apart and gap(one, other) <= 0:
+            return i, j
+    return None
