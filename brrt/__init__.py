@@ -13,6 +13,7 @@ from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
+from brrt.replay.checks import Finding, check
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
@@ -30,6 +31,7 @@ __all__ = [
     "Chain",
     "Difference",
     "Events",
+    "Finding",
     "Kind",
     "Manifest",
     "McapSink",
@@ -47,6 +49,7 @@ __all__ = [
     "Sink",
     "Tree",
     "World",
+    "check",
     "first_difference",
     "forest",
     "make_robot",

@@ -3,17 +3,22 @@
 import platform
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from typing import Any, Protocol
 
 import numpy as np
 
+from brrt.errors import BrrtError
 from brrt.events import Events, Kind
 from brrt.kernels.emit import EventLog
+from brrt.planners import PLANNERS
 from brrt.planners.stop import Stop
+from brrt.problem import Problem
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest, Scenario
+from brrt.settings import Settings
 
 _SWITCH_S = 0.0005
 
@@ -28,20 +33,35 @@ class Sink(Protocol):
         """Release everything; `whole` says that the run came to its own end."""
 
 
+class Solver(Protocol):
+    """What a planner has to have; `Planner` is a base class that checks settings too."""
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+
+
 class Run:
     """A scenario that has been found sound, ready to go once.
 
     Args:
         scenario: What to run.
+        planner: A planner of your own, any object with `Planner.solve`; the scenario's `planner`
+            is then its name in the log. By default the registered one of that name.
         batch: Events in a batch at most; the log does not depend on it.
 
     Raises:
         BrrtError: The scenario is of no use; nothing has been written anywhere.
     """
 
-    def __init__(self, scenario: Scenario, *, batch: int = 8192) -> None:
-        self.problem = scenario.make_problem()
-        self._planner, self._smoother = scenario.make_planner(), scenario.make_smoother()
+    def __init__(
+        self, scenario: Scenario, *, planner: Solver | None = None, batch: int = 8192
+    ) -> None:
+        if planner is not None:
+            scenario = _named(scenario, planner)
+        self._planner = scenario.make_planner() if planner is None else planner
+        self.problem, self._smoother = scenario.make_problem(), scenario.make_smoother()
         self._execute = scenario.make_execute()
         self._compile()
         self._log = EventLog(self.problem.dof, batch, logical_clock=scenario.clock == "logical")
@@ -74,14 +94,16 @@ class Run:
     def events(self) -> Iterator[Events]:
         """Plan, smooth, drive; yield what happens, in batches."""
         rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
-        path, moved = None, False
+        path, moved, iteration = None, False, 0
         for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
             path = _last_path(batch, path)
             moved = moved or Kind.MOVE in batch.counts
+            # A planner may have gone on after its path; the count never falls.
+            iteration = batch.last.iteration if len(batch) else iteration
             yield batch
         if path is None:
             return
-        waypoints, iteration = path["waypoints"], int(path["iteration"])
+        waypoints = path["waypoints"]
         space = self.problem.space
         if self._smoother is not None and not self.stop.interrupted:
             for batch in self._smoother.smooth(
@@ -120,6 +142,21 @@ class Run:
             sys.setswitchinterval(patience)
             _close_all(sinks, whole=whole)
         return metrics
+
+
+def _named(scenario: Scenario, planner: Solver) -> Scenario:
+    """Return the scenario as the log of somebody's own planner states it.
+
+    Raises:
+        BrrtError: The name is that of a registered planner, which would be blamed for this one.
+    """
+    own = PLANNERS.get(scenario.planner)
+    if own is not None and not isinstance(planner, own):
+        raise BrrtError(
+            f"planner {scenario.planner} is brrt's own; name yours: Scenario(planner='my-planner')"
+        )
+    settings = planner.as_dict() if isinstance(planner, Settings) else scenario.params
+    return replace(scenario, params=settings)
 
 
 def _last_path(batch: Events, before: Any) -> Any:

@@ -75,16 +75,16 @@ class Scenario:
         for name in ("smooth", "execute"):
             if not isinstance(getattr(self, name), bool):
                 raise BrrtError(f"{name} must be true or false, not {getattr(self, name)!r}")
-        if self.planner not in PLANNERS:
-            raise unknown("planner", self.planner, PLANNERS)
         if not names_robot_file(self.robot):
             make_robot(self.robot)
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
         self._check_numbers()
-        settings = self.make_planner().as_dict()
-        given = {name: settings[name] for name in self.params}
-        object.__setattr__(self, "params", given)
+        # A recording of a planner that is not known here can be read all the same.
+        if self.planner in PLANNERS:
+            settings = self.settings()
+            given = {name: settings[name] for name in self.params}
+            object.__setattr__(self, "params", given)
 
     def _check_numbers(self) -> None:
         _whole("seed", self.seed, low=0)
@@ -148,8 +148,20 @@ class Scenario:
         return replace(self, draws=max(1, iterations), time=None)
 
     def make_planner(self) -> Planner:
-        """Make the planner with its settings."""
+        """Make the planner with its settings.
+
+        Raises:
+            BrrtError: There is no such planner here.
+        """
+        if self.planner not in PLANNERS:
+            raise unknown("planner", self.planner, PLANNERS)
         return PLANNERS[self.planner].parse(f"planner {self.planner}", self.params)
+
+    def settings(self) -> dict[str, Any]:
+        """All settings of the planner; of one that is not known here, those that were given."""
+        if self.planner not in PLANNERS:
+            return dict(self.params)
+        return self.make_planner().as_dict()
 
     def make_smoother(self) -> Shortcut | None:
         """Make the smoother, if there is to be one."""
@@ -161,7 +173,8 @@ class Scenario:
 
     def make_stop(self) -> Stop:
         """Make the budget."""
-        usual = _MOST if self.time is not None else self.make_planner().default_iterations
+        planner = PLANNERS.get(self.planner, Planner)
+        usual = _MOST if self.time is not None else planner.default_iterations
         iterations = usual if self.iterations is None else self.iterations
         return Stop(iterations=iterations, draws=self.draws, time_s=self.time)
 

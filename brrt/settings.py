@@ -142,13 +142,18 @@ def _typed(name: str, value: Any, hint: Any) -> Any:
     try:
         if isinstance(value, bool):
             raise TypeError  # noqa: TRY301 - a truth value is no number
-        number = hint(value)
+        number = hint(float(value)) if hint is int and _is_scientific(value) else hint(value)
     except (TypeError, ValueError, OverflowError):
         kind = "a whole number" if hint is int else "a number"
         raise BrrtError(f"{name} must be {kind}, not {value!r}") from None
-    if hint is int and isinstance(value, float) and value != number:
+    inexact = isinstance(value, float) or _is_scientific(value)
+    if hint is int and inexact and float(value) != number:
         raise BrrtError(f"{name} must be a whole number, not {value!r}")
     return number
+
+
+def _is_scientific(value: Any) -> bool:
+    return isinstance(value, str) and "e" in value.lower()
 
 
 def _as_bool(name: str, value: Any) -> bool:

@@ -9,6 +9,7 @@ from .console import Code, complain
 from .lists import planners, robots, worlds
 from .plan import plan
 from .replay import replay
+from .verify import verify
 
 app = typer.Typer(
     name="brrt",
@@ -24,15 +25,18 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt replay run.mcap[/bold] rebuilds the run's figures and trees from the file alone
 
+[bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
+
 [bold]rerun run.rrd[/bold] shows the tree as it grows
 
 [bold]brrt planners[/bold] lists what there is to set
 
-Exit codes: 0 solved, equal; 1 no path, differs; 2 bad input; 130 interrupted.""",
+Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 interrupted.""",
 )
 
 app.command()(plan)
 app.command()(replay)
+app.command()(verify)
 app.command()(planners)
 app.command()(robots)
 app.command()(worlds)

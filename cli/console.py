@@ -66,19 +66,39 @@ def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "outcome", ("solved" if f["solved"] else f"not solved, {f['status']}")
     time = "" if f["plan_time_s"] is None else f" in {seconds(f['plan_time_s'])}"
     yield "planned", f"{f['iterations']:,} iterations{time}"
-    rejected = f["rejects"] / f["samples"] if f["samples"] else 0.0
-    counts = f"{f['samples']:,} samples, {f['nodes']:,} nodes, {f['rejects']:,} rejected"
-    yield "recorded", f"{f['events']:,} events: {counts} ({rejected:.0%})"
+    yield "events", f"{f['events']:,}: {', '.join(_counts(f))}"
     if f["path"] is not None:
-        yield "path", f"cost {f['path_cost']:.6g}, {len(f['path']) - 1} moves"
+        first = ""
+        if f["first_path_cost"] != f["path_cost"]:
+            when = f"{f['first_path_cost']:.6g} after {seconds(f['first_path_s'])}"
+            first = f" (the first one {when})"
+        yield "path", f"cost {f['path_cost']:.6g}{first}, {len(f['path']) - 1} motions"
     if f["smoothed_path"] is not None:
         saved = 1 - f["smoothed_cost"] / f["path_cost"] if f["path_cost"] else 0.0
-        moves = len(f["smoothed_path"]) - 1
+        motions = len(f["smoothed_path"]) - 1
         effort = f"{f['shortcuts']} attempts in {seconds(f['smooth_time_s'])}"
         yield (
             "smoothed",
-            f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {moves} moves, {effort}",
+            f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {motions} motions, {effort}",
         )
+    if f["max_move_time_s"] is not None:
+        slowest = f"the slowest planned in {seconds(f['max_move_time_s'])}"
+        late = f"{f['deadline_misses']} late" if f["deadline_misses"] else "none late"
+        yield "driven", f"{f['moves']:,} moves, {slowest}, {late}"
+        if f["deadline_misses"]:
+            charged = f"a classic run charges {f['charged_moves']:,} moves"
+            yield "", f"the robot stayed for {f['stays']:,} deadlines; {charged}"
+
+
+def _counts(f: Mapping[str, Any]) -> Iterator[str]:
+    """What a run consists of, as far as there is any of it."""
+    for name, word in (
+        ("samples", "samples"), ("nodes", "nodes"), ("expanded", "cells expanded"),
+        ("learned", "estimates raised"), ("rejects", "rejected"), ("rewires", "rewired"),
+        ("links", "links"),
+    ):  # fmt: skip
+        if f[name]:
+            yield f"{f[name]:,} {word}"
 
 
 def seconds(value: float) -> str:

@@ -26,7 +26,12 @@ def plan(
         ),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option(help="Default point.", rich_help_panel="Problem")
+        str | None,
+        typer.Option(
+            help="A robot with parameters, as polygon:length=4,width=2, or a file. "
+            "Default point; brrt robots lists them.",
+            rich_help_panel="Problem",
+        ),
     ] = None,
     start: Annotated[
         str | None,

@@ -168,13 +168,13 @@ class _Trees:
         self._dof = 0
 
     def write(self, events: "Events") -> None:
-        """Keep the edges."""
+        """Keep the edges and rewires."""
         from brrt.events import Events, Kind  # noqa: PLC0415
 
         self._dof = events.dof
-        edges = events[Kind.EDGE]
-        if len(edges):
-            self._batches.append(Events(events.dof, {Kind.EDGE: edges}))
+        kept = {k: t for k in (Kind.EDGE, Kind.REWIRE) if len(t := events[k])}
+        if kept:
+            self._batches.append(Events(events.dof, kept))
 
     def show(self) -> None:
         """Print a line a tree."""

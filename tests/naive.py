@@ -125,11 +125,11 @@ def hull_distance(one: Floats, other: Floats) -> Floats:
     far = np.minimum(_to_segment(one, *q).min(axis=(1, 2)), _to_segment(other, *p).min(axis=(1, 2)))
     sides = [_side(*p, other), _side(*p, q[1]), _side(*q, one), _side(*q, p[1])]
     crossing = (sides[0] * sides[1] < 0) & (sides[2] * sides[3] < 0)
-    meet = crossing.any(axis=(1, 2))
+    meet = np.asarray(crossing.any(axis=(1, 2)))
     if one.shape[1] > 2:
-        meet |= (sides[0] >= 0).all(axis=1).any(axis=1)
+        meet |= np.asarray(np.all(sides[0] >= 0, axis=1)).any(axis=1)
     if other.shape[2] > 2:
-        meet |= (sides[2] >= 0).all(axis=2).any(axis=1)
+        meet |= np.asarray(np.all(sides[2] >= 0, axis=2)).any(axis=1)
     return np.where(meet, 0.0, far)
 
 
@@ -139,7 +139,7 @@ def _to_segment(point: Floats, a: Floats, b: Floats) -> Floats:
     square = (along * along).sum(axis=-1)
     part = (along * offset).sum(axis=-1) / np.where(square > 0, square, 1.0)
     gap = offset - np.clip(part, 0, 1)[..., None] * along
-    return np.hypot(gap[..., 0], gap[..., 1])
+    return np.asarray(np.hypot(gap[..., 0], gap[..., 1]))
 
 
 def _side(a: Floats, b: Floats, point: Floats) -> Floats:

@@ -29,8 +29,8 @@ def world_of(
     dim: int, *, low: float = 0.0, high: float = 10.0, balls: object = (), boxes: object = ()
 ) -> World:
     """A square or cubic world."""
-    arrays = [np.array(rows, dtype=np.float64) for rows in (balls, boxes)]
-    return World("test", np.full(dim, low), np.full(dim, high), *arrays)
+    balls, boxes = (np.array(rows, dtype=np.float64) for rows in (balls, boxes))
+    return World("test", np.full(dim, low), np.full(dim, high), balls, boxes)
 
 
 @kernel

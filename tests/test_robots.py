@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -63,9 +66,9 @@ def all_between(space: Any, A: Floats, B: Floats, part: float, out: Floats) -> N
 def all_nearest(space: Any, tree: Any, points: Floats, Q: Floats, found: NDArray[np.int64]) -> None:
     """Enter all points, then look up the nearest of each query."""
     for node in range(1, len(points)):
-        insert(tree, space, points, node)
+        insert(tree, space, points, node, 0)
     for i in range(len(Q)):
-        found[i] = nearest(tree, space, Q, i)
+        found[i] = nearest(tree, space, Q, i, 0)
 
 
 def free(robot: Robot, world: World, A: Floats, B: Floats) -> NDArray[np.bool_]:
@@ -347,7 +350,7 @@ def test_nearest_neighbours_in_the_metric(kind: str, seed: int) -> None:
     points = rng.uniform(space.lower, space.upper, (200, len(space.lower)))
     Q = rng.uniform(space.lower, space.upper, (100, len(space.lower)))
     found = np.zeros(len(Q), np.int64)
-    all_nearest(space, rooted_kdtree(points[0], len(points)), points, Q, found)
+    all_nearest(space, rooted_kdtree(points[:1], len(points)), points, Q, found)
     for q, node in zip(Q, found, strict=True):
         far = robot.distance(points, q)
         assert far[node] == far.min()
@@ -358,7 +361,7 @@ def test_volume_of_the_unit_ball(kind: str) -> None:
     """As counted by drawing from a box around the ball."""
     rng = np.random.default_rng(5)
     world = World("empty", np.zeros(2), np.full(2, 100.0))
-    robot = {**MAKERS, "point": lambda _: Point()}[kind](rng).settled(world)
+    robot = MAKERS[kind](rng) if kind in MAKERS else Point()
     dof = robot.dof(world)
     # The extent of the ball along each coordinate, from the distance of a small step.
     halves = 0.01 / np.array([robot.distance(np.zeros(dof), 0.01 * e) for e in np.eye(dof)])
@@ -553,6 +556,29 @@ def test_a_run_from_end_to_end(kind: str) -> None:
         assert figures[f"{name}_cost"] == pytest.approx(cost)
 
 
+@BODIES
+def test_kernels_are_plain_python(kind: str) -> None:
+    """Uncompiled, they do the same, bit for bit."""
+    scenario = json.dumps(RUNS[kind].as_dict() | {"iterations": 40})
+    program = (
+        "import sys, json; from brrt import Memory, Run, Scenario;"
+        "run, log = Run(Scenario.parse(json.loads(sys.argv[1]))), Memory();"
+        "run.execute([log]);"
+        "print([event['q'].tobytes().hex() for kind in ('EDGE', 'REJECT')"
+        " for event in log.events()[__import__('brrt').Kind[kind]]])"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program, scenario],
+            env={**os.environ, "NUMBA_DISABLE_JIT": word},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for word in ("0", "1")
+    ]  # fmt: skip
+    assert said[0] == said[1]
+    assert len(said[0]) > 100
+
+
 def test_a_recording_needs_no_robot_file(brrt: Callable[..., Result]) -> None:
     """The robot's definition stands in the manifest, and a scenario finds the file beside it."""
     Path("robot.json").write_text(Polygon(2.0, 1.0).to_json())
@@ -564,3 +590,79 @@ def test_a_recording_needs_no_robot_file(brrt: Callable[..., Result]) -> None:
     replayed = brrt("replay", "elsewhere/run.mcap", "--json")
     assert replayed.json == planned.json
     assert brrt("replay", "elsewhere/run.mcap", "--rrd", "run.rrd").code == 0
+
+
+# Real input, and the classic experiments
+
+
+needs_real = pytest.mark.skipif(not REAL.is_dir(), reason="no real robots here")
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples(path: Path) -> None:
+    """Each is solved, but for the one that cannot be."""
+    run = Run(Scenario.load(path))
+    figures = run.execute().as_dict()
+    assert figures["solved"] == ("unreachable" not in path.stem)
+    if figures["solved"]:
+        check_path(run, np.array(figures["path"]))
+        check_path(run, np.array(figures["smoothed_path"]))
+
+
+def real_scenario(folder: Path, name: str) -> Scenario:
+    """Translate one of the real experiments into files of ours."""
+    data = json.loads((REAL / "polygon_and_chain.json").read_text())
+    given, (x0, y0, x1, y1) = data["worlds"][name], data["region"]
+    polygons = [
+        (np.array(obstacle["polygon"], float) + obstacle["at"]).tolist()
+        for obstacle in given["obstacles"]
+    ]
+    world = World("real", np.array([x0, y0]), np.array([x1, y1]), polygons=tuple(polygons))
+    robot = {key: value for key, value in given["robot"].items() if key != "kind"}
+    (folder / "robot.json").write_text(
+        json.dumps({**HEAD, "kind": given["robot"]["kind"], **robot})
+    )
+    world.save(folder / "world.json")
+    return Scenario(
+        world=str(folder / "world.json"), robot=str(folder / "robot.json"),
+        start=tuple(given["start"]), goal=tuple(given["goal"]),
+    )  # fmt: skip
+
+
+@needs_real
+@pytest.mark.parametrize("name", ["robot_world", "robot_arm_world"])
+def test_real_experiments(name: str, tmp_path: Path) -> None:
+    """Planned, and free by the twin."""
+    run = Run(real_scenario(tmp_path, name))
+    figures = run.execute().as_dict()
+    assert figures["solved"]
+    check_path(run, np.array(figures["path"]))
+    check_path(run, np.array(figures["smoothed_path"]))
+
+
+@needs_real
+@pytest.mark.parametrize("links", [3])
+def test_horn(links: int, tmp_path: Path) -> None:
+    """A chain of line segments among line segments, joints without limits, links kept apart."""
+    data = json.loads((REAL / f"horn_{links:02}.json").read_text())
+    length = data["link_length"]
+    joints = tuple(
+        Joint((length if i else 0.0, 0.0), np.array([[0.0, 0.0], [length, 0.0]]), None)
+        for i in range(links)
+    )
+    x, y = data["base"]
+    robot = Chain(links, self_collision=True, base_x=x, base_y=y, joints=joints)
+    walls = tuple(np.array(segment).reshape(2, 2) for segment in data["segments"])
+    World("horn", np.full(2, -1.2), np.full(2, 1.2), polygons=walls).save(tmp_path / "world.json")
+    (tmp_path / "robot.json").write_text(robot.to_json())
+    run = Run(
+        Scenario(
+            world=str(tmp_path / "world.json"), robot=str(tmp_path / "robot.json"),
+            start=tuple(data["start"]), goal=tuple(data["goal"]),
+            params={"step": 0.3}, iterations=2_000_000,
+        )
+    )  # fmt: skip
+    figures = run.execute().as_dict()
+    assert figures["solved"]
+    check_path(run, np.array(figures["path"]))

@@ -219,9 +219,9 @@ def worlds(draw: st.DrawFn) -> World:
     box = st.tuples(point, point).map(lambda it: np.sort(it, axis=0).ravel())
     low, high = np.sort([draw(point), draw(point)], axis=0)
     high = np.maximum(high, np.nextafter(low, np.inf))
-    ends = [draw(st.none() | point.map(np.array)) for _ in range(2)]
+    start, goal = (draw(st.none() | point.map(np.array)) for _ in range(2))
     balls, boxes = draw(st.lists(ball, max_size=3)), draw(st.lists(box, max_size=3))
-    return World("w", low, high, np.array(balls), np.array(boxes), *ends)
+    return World("w", low, high, np.array(balls), np.array(boxes), start, goal)
 
 
 @given(worlds())

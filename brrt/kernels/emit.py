@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.errors import BrrtError, unknown
 from brrt.events import FIELDS, Events, Instant, Kind, LazyTables, Table, table_dtype
 from brrt.kernels.clock import COMPILED_CLOCK, now_ns
 from brrt.kernels.jit import inlined
@@ -130,6 +131,42 @@ def _slots(kind: Kind) -> list[tuple[str, str, int]]:
 _SLOTS: Mapping[Kind, list[tuple[str, str, int]]] = {kind: _slots(kind) for kind in Kind}
 
 
+def _unfit(
+    kind: Kind, fields: Mapping[str, Any], dof: int, room: int, error: Exception
+) -> BrrtError:
+    """Say which field of an event is wrong, and what it should be."""
+    expected = {field.name: field.type for field in FIELDS[kind]}
+    if room <= 0:
+        return BrrtError("the batch is full; yield log.drain() while there is room")
+    for name in fields:
+        if name not in expected:
+            return unknown(f"field of a {kind.label} event", name, expected)
+    for name, what in expected.items():
+        if name not in fields:
+            return BrrtError(f"a {kind.label} event needs the field {name!r} ({what})")
+    shapes = {"q": f"{dof} numbers", "q[]": f"rows of {dof} numbers"}
+    for name, what in expected.items():
+        if not _fits(fields[name], what, dof):
+            text = " ".join(repr(fields[name]).split())
+            return BrrtError(
+                f"{name} of a {kind.label} event must be {shapes.get(what, what)}, not {text:.60}"
+            )
+    return BrrtError(f"a {kind.label} event cannot be recorded: {error}")
+
+
+def _fits(value: Any, what: str, dof: int) -> bool:
+    """Whether a value can be put into a field of that type."""
+    try:
+        if what == "q":
+            return np.array(value, np.float64).shape == (dof,)
+        if what == "q[]":
+            return np.array(value, np.float64).shape == (len(value), dof)
+        np.empty(1, np.float64 if what.startswith("float") else np.int32)[0] = value
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return True
+
+
 class EventLog:
     """The log that a run writes to: numbers and times every event, and hands them out in batches.
 
@@ -201,31 +238,47 @@ class EventLog:
             kind: What happened.
             iteration: The planner's count.
             fields: Every field that `events.FIELDS` declares for the kind.
+
+        Raises:
+            BrrtError: A field is missing, not known or of no use, or the batch is full.
         """
-        buffer, row, ints = self.buffer, len(self), 0
+        row = len(self)
         if row == 0 and self.buffer.state[_FIRST_SEQ] == 0:
             self._begin()
         self.tick()
-        for name, column, _ in _SLOTS[kind]:
+        try:
+            self._put(kind, row, fields)
+        except (KeyError, TypeError, ValueError, OverflowError, IndexError) as error:
+            raise _unfit(kind, fields, self.dof, self.room, error) from None
+        buffer = self.buffer
+        buffer.kind[row], buffer.iteration[row] = kind, iteration
+        buffer.t[row] = buffer.state[_LAST_T] = self._time(row)
+        buffer.state[_COUNT] = row + 1
+
+    def _put(self, kind: Kind, row: int, fields: Mapping[str, Any]) -> None:
+        buffer, slots, ints = self.buffer, _SLOTS[kind], 0
+        if len(fields) != len(slots):
+            raise KeyError
+        for name, column, _ in slots:
             value = fields[name]
             if column == "points":
-                buffer.ints[row, ints : ints + 2] = self._keep_points(value)
-                buffer = self.buffer
+                place = self._keep_points(value)
+                buffer = self.buffer  # it may have been replaced by a larger one
+                buffer.ints[row, ints : ints + 2] = place
                 ints += 2
             elif column == "q":
+                if len(value) != self.dof:  # numpy would spread a single number over all
+                    raise ValueError
                 buffer.q[row] = value
             elif column == "real":
                 buffer.real[row] = value
             else:
                 buffer.ints[row, ints] = value
                 ints += 1
-        buffer.kind[row], buffer.iteration[row] = kind, iteration
-        buffer.t[row] = buffer.state[_LAST_T] = self._time(row)
-        buffer.state[_COUNT] = row + 1
 
     def _keep_points(self, points: Any) -> tuple[int, int]:
         """Store a path's waypoints; return their first row and how many there are."""
-        rows = np.array(points, np.float64).reshape(-1, self.dof)
+        rows = np.array(points, np.float64).reshape(len(points), self.dof)
         first = int(self.buffer.state[_POINTS])
         if first + len(rows) > len(self.buffer.points):
             self.reserve(0, 2 * (first + len(rows)))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.kernels.emit import Buffer, room
-from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.jit import kernel
 from brrt.kernels.lattice import (
     Lattice,
     Search,
@@ -23,38 +23,6 @@ BATCH_FULL, TABLE_FULL, LIMIT, SOLVED, NO_PATH = range(5)
 
 EXPANSIONS, LAST = range(2)
 """Places in `counts`."""
-
-
-@inlined
-def iterate(
-    lattice: Lattice,
-    search: Search,
-    counts: NDArray[np.int64],
-    space: Any,
-    log: Buffer,
-    limit: int,
-) -> int:
-    """One call of `advance`."""
-    enter_cells(lattice)
-    if counts[LAST] < 0:
-        counts[LAST] = 0
-        begin(search, lattice, 0)
-    while True:
-        # Room for a cell and its neighbours, and for the path and the end after them.
-        if room(log) < len(lattice.deltas) + 3:
-            return BATCH_FULL
-        if not lattice_has_room(lattice) or not search_has_room(search, lattice):
-            return TABLE_FULL
-        best = best_open(search)
-        if best < 0:
-            return NO_PATH
-        if counts[EXPANSIONS] >= limit:
-            return LIMIT
-        counts[EXPANSIONS] += 1
-        counts[LAST] = best
-        # The straight way on is as long as the estimate: no other path can be shorter.
-        if expand(search, lattice, space, log, best, counts[EXPANSIONS]):
-            return SOLVED
 
 
 @kernel
@@ -76,4 +44,23 @@ def advance(
         log: Events.
         limit: Cells to expand in all.
     """
-    return iterate(lattice, search, counts, space, log, limit)
+    enter_cells(lattice)
+    if counts[LAST] < 0:
+        counts[LAST] = 0
+        begin(search, lattice, 0)
+    while True:
+        # Room for a cell and its neighbours, and for the path and the end after them.
+        if room(log) < len(lattice.deltas) + 3:
+            return BATCH_FULL
+        if not lattice_has_room(lattice) or not search_has_room(search, lattice):
+            return TABLE_FULL
+        best = best_open(search)
+        if best < 0:
+            return NO_PATH
+        if counts[EXPANSIONS] >= limit:
+            return LIMIT
+        counts[EXPANSIONS] += 1
+        counts[LAST] = best
+        # The straight way on is as long as the estimate: no other path can be shorter.
+        if expand(search, lattice, space, log, best, counts[EXPANSIONS]):
+            return SOLVED

@@ -191,8 +191,8 @@ def go(walk: Walk, lattice: Lattice, log: Buffer) -> None:
     )  # fmt: skip
 
 
-@inlined
-def iterate(
+@kernel
+def advance(
     walk: Walk,
     lattice: Lattice,
     search: Search,
@@ -201,7 +201,17 @@ def iterate(
     lookahead: int,
     limit: int,
 ) -> int:
-    """One call of `advance`."""
+    """Run until at the goal, proved hopeless, out of room, or `limit` moves are made.
+
+    Args:
+        walk: The robot's way.
+        lattice: The cells.
+        search: Where to look ahead.
+        space: Configuration space.
+        log: Events.
+        lookahead: Cells to expand before a move.
+        limit: Moves to make in all.
+    """
     counts = walk.counts
     enter_cells(lattice)
     while True:
@@ -248,27 +258,3 @@ def iterate(
                     continue
             plan_moves(walk, search, lattice, best, arrives)
             counts[STAGE] = LEARN
-
-
-@kernel
-def advance(
-    walk: Walk,
-    lattice: Lattice,
-    search: Search,
-    space: Any,
-    log: Buffer,
-    lookahead: int,
-    limit: int,
-) -> int:
-    """Run until at the goal, proved hopeless, out of room, or `limit` moves are made.
-
-    Args:
-        walk: The robot's way.
-        lattice: The cells.
-        search: Where to look ahead.
-        space: Configuration space.
-        log: Events.
-        lookahead: Cells to expand before a move.
-        limit: Moves to make in all.
-    """
-    return iterate(walk, lattice, search, space, log, lookahead, limit)

@@ -6,8 +6,8 @@ import threading
 from brrt.events import Events
 from brrt.run import Sink
 
-_BATCHES = 2
-"""Batches in waiting; a planner that is faster than the disk waits for it."""
+_BATCHES = 24
+"""Batches in waiting, half a megabyte each: so far a planner may be ahead before it waits."""
 
 
 class Background:

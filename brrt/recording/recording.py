@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from brrt.events import Events
+from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -36,3 +37,7 @@ class Recording:
         for batch in self.batches():
             metrics.write(batch)
         return metrics
+
+    def check(self) -> list[Finding]:
+        """Hold the run to what its planner promises; return what it breaks."""
+        return check(self.manifest, self.world, self.events())

@@ -238,7 +238,7 @@ def _still_3d(world: World) -> dict[str, Any]:
 def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> str:
     """Describe the run in Markdown; with its figures once it is over."""
     scenario = manifest.scenario
-    settings = scenario.make_planner().as_dict()
+    settings = scenario.settings()
     rows = {
         "world": scenario.world,
         "robot": scenario.robot,

@@ -1,4 +1,4 @@
-"""The trees at any instant: a fold over the edges of a log."""
+"""The trees at any instant: a fold over the edges and rewires of a log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +8,17 @@ from numpy.typing import NDArray
 
 from brrt.errors import RecordingError
 from brrt.events import Events, Kind
+from brrt.replay.ledger import (
+    CIRCLE,
+    NO_NODE,
+    NO_PARENT,
+    SOUND,
+    Changes,
+    Distance,
+    changes,
+    edge_lengths,
+    fold,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,17 +74,26 @@ class Tree:
         return self.q[lineage[::-1]]
 
 
-def forest(events: Events) -> Mapping[int, Tree]:
+def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tree]:
     """Rebuild the trees as they stand after the given events.
 
-    Cut the log with `Events.until` for an earlier instant.
+    Cut the log with `Events.until` for an earlier instant. Where a node was rewired, the costs of
+    its descendants follow; a log does not state those.
+
+    Args:
+        events: From the first event on.
+        distance: The robot's metric, on rows of configurations (`Point().distance`), to compute
+            the lengths of the edges of trees that rewire. By default they are what the log states
+            less the parent's cost then, so costs are right to about depth roundings. Trees that
+            only grow keep the costs that the log states.
 
     Raises:
-        RecordingError: A tree's nodes are not numbered 0, 1, 2 ... in order.
+        RecordingError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire names
+            a node that is not there, or closes a circle.
     """
-    edges = events[Kind.EDGE]
+    edges, rewired = events[Kind.EDGE], set(np.unique(events[Kind.REWIRE]["tree"]).tolist())
     trees = {}
-    for number in np.unique(edges["tree"]):
+    for number in sorted(set(np.unique(edges["tree"]).tolist()) | rewired):
         rows = edges[edges["tree"] == number]
         wrong = np.flatnonzero(rows["node"] != np.arange(len(rows)))
         if len(wrong):
@@ -81,5 +101,27 @@ def forest(events: Events) -> Mapping[int, Tree]:
             raise RecordingError(
                 f"event {row['seq']}: node {row['node']} joins tree {number} as its node {wrong[0]}"
             )
-        trees[int(number)] = Tree(rows["q"], rows["parent"], rows["cost"], rows["seq"])
+        tree = Tree(rows["q"], rows["parent"], rows["cost"], rows["seq"])
+        trees[number] = (
+            _rewired(tree, changes(events, number), distance) if (number in rewired) else tree
+        )
     return trees
+
+
+def _rewired(tree: Tree, made: Changes, distance: Distance | None) -> Tree:
+    """Make the changes to a tree that so far has the parents that its nodes were born with."""
+    length = None
+    if distance is not None:
+        length = edge_lengths(tree.q, made, distance)
+    ledger = fold(made, length)
+    wrong = np.flatnonzero(ledger.verdict != SOUND)
+    if len(wrong):
+        i = int(wrong[0])
+        node, parent = int(made.node[i]), int(made.parent[i])
+        why = {
+            NO_PARENT: f"node {node} gets parent {parent}, which is not there",
+            NO_NODE: f"node {node} is rewired before it is there",
+            CIRCLE: f"with parent {parent}, node {node} is its own ancestor",
+        }[int(ledger.verdict[i])]
+        raise RecordingError(f"event {made.seq[i]}: {why}")
+    return Tree(tree.q, ledger.parent.astype(np.int32), ledger.cost, tree.born)

@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Phase, Stage, Status
-from brrt.scenario import Manifest
+from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
+from brrt.scenario import Manifest, Scenario
+
+Path = tuple[float, NDArray[np.float64]]
+"""Cost and waypoints."""
 
 
 class Metrics:
@@ -23,7 +26,10 @@ class Metrics:
         self._counts = dict.fromkeys(Kind, 0)
         self._iterations = 0
         self._last_t = 0
-        self._paths: dict[Stage, tuple[float, NDArray[np.float64]]] = {}
+        self._raw: Path | None = None
+        self._smoothed: Path | None = None
+        self._first: tuple[Instant, float] | None = None
+        self._moves = _Moves(manifest.scenario)
         self._began: dict[Phase, int] = {}
         self._ended: dict[Phase, tuple[int, Status]] = {}
 
@@ -36,14 +42,24 @@ class Metrics:
         self._iterations = max(self._iterations, last.iteration)
         self._last_t = max(self._last_t, last.t)
         for event in events[Kind.PATH]:
-            path = np.array(event["waypoints"]).reshape(-1, events.dof)
-            self._paths[Stage(int(event["stage"]))] = (float(event["cost"]), path)
+            self._take_path(event, events.dof)
         for event in events[Kind.PHASE]:
             phase, status = Phase(int(event["name"])), Status(int(event["status"]))
             if status is Status.BEGIN:
                 self._began[phase] = int(event["t"])
             else:
                 self._ended[phase] = (int(event["t"]), status)
+        self._moves.write(events[Kind.MOVE], self._began.get(Phase.PLAN, 0))
+
+    def _take_path(self, event: Any, dof: int) -> None:
+        path = (float(event["cost"]), np.array(event["waypoints"]).reshape(-1, dof))
+        if event["stage"] == Stage.SMOOTHED:
+            self._smoothed = path
+            return
+        # A better path takes the place of the one before it.
+        self._raw = path
+        if self._first is None:
+            self._first = Instant(int(event["t"]), int(event["iteration"])), path[0]
 
     def close(self, *, whole: bool = True) -> None:
         """Nothing to release."""
@@ -51,7 +67,7 @@ class Metrics:
     @property
     def solved(self) -> bool:
         """Whether there is a path."""
-        return Stage.RAW in self._paths
+        return self._raw is not None
 
     @property
     def iterations(self) -> int:
@@ -74,11 +90,12 @@ class Metrics:
     def as_dict(self) -> dict[str, Any]:
         """Return the figures under the names that `--json` prints; None where there is none.
 
-        `nodes` and `edges` count the events of kind edge, roots included; `moves` counts motions
-        of the final path (waypoints - 1).
+        `nodes` and `edges` count the events of kind edge, roots included. `path` is the last that
+        the planner found. Where a robot moved, `moves` counts the last trial's moves; elsewhere
+        the motions of the final path (waypoints - 1).
         """
         scenario = self._manifest.scenario
-        raw, smoothed = self._paths.get(Stage.RAW), self._paths.get(Stage.SMOOTHED)
+        raw, smoothed = self._raw, self._smoothed
         final = smoothed or raw
         return {
             "planner": scenario.planner,
@@ -93,7 +110,10 @@ class Metrics:
             "rejects": self._counts[Kind.REJECT],
             "nodes": self._counts[Kind.EDGE],
             "edges": self._counts[Kind.EDGE],
-            "rewires": 0,
+            "rewires": self._counts[Kind.REWIRE],
+            "links": self._counts[Kind.CONNECT],
+            "expanded": self._counts[Kind.EXPAND],
+            "learned": self._counts[Kind.HEURISTIC],
             "shortcuts": self._counts[Kind.SHORTCUT],
             "path_cost": _finite(raw and raw[0]),
             "path": None if raw is None else raw[1].tolist(),
@@ -102,8 +122,65 @@ class Metrics:
             "plan_time_s": self._seconds(Phase.PLAN),
             "smooth_time_s": self._seconds(Phase.SMOOTH),
             "moves": None if final is None else len(final[1]) - 1,
-            "max_move_time_s": None,
-            "deadline_misses": None,
+            **self._first_path(),
+            **self._moves.as_dict(),
+        }
+
+    def _first_path(self) -> dict[str, Any]:
+        """When the first path was found, and what it cost."""
+        if self._first is None:
+            return dict.fromkeys(("first_path_s", "first_path_iteration", "first_path_cost"))
+        (t, iteration), cost = self._first
+        return {
+            "first_path_s": (t - self._began.get(Phase.PLAN, 0)) / 1e9,
+            "first_path_iteration": iteration,
+            "first_path_cost": _finite(cost),
+        }
+
+
+class _Moves:
+    """The figures of a robot that moves, one move in every deadline.
+
+    A move's planning time is the time since the move before it; the first one's, since planning
+    began.
+
+    Args:
+        scenario: Says the deadline.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._deadline = max(1, round(1e9 * scenario.deadline))
+        self._trial, self._count = 0, 0
+        self._last_t: int | None = None
+        self._longest = self._misses = self._charged = self._stays = 0
+
+    def write(self, moves: Table, began: int) -> None:
+        """Take in a batch; `began` is when planning began, in ns."""
+        if not len(moves):
+            return
+        before = began if self._last_t is None else self._last_t
+        times = np.diff(moves["t"], prepend=before)
+        deadlines = np.maximum(1, -(-times // self._deadline))
+        self._longest = max(self._longest, int(times.max()))
+        self._misses += int((times > self._deadline).sum())
+        self._charged += int(deadlines.sum())
+        self._stays += int((deadlines - 1).sum())
+        self._last_t, trial = int(moves["t"][-1]), int(moves["trial"][-1])
+        if trial != self._trial:
+            self._trial, self._count = trial, 0
+        self._count += int((moves["trial"] == trial).sum())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures; without moves the robot's are None."""
+        if self._last_t is None:
+            names = ("max_move_time_s", "deadline_misses", "charged_moves", "stays")
+            return dict.fromkeys(names)
+        return {
+            "moves": self._count,
+            "max_move_time_s": self._longest / 1e9,
+            "deadline_misses": self._misses,
+            "charged_moves": self._charged,
+            "stays": self._stays,
         }
 
 

@@ -1,0 +1,308 @@
+"""Rules about searches on a lattice: cells, expansions, estimates, and the moves they lead to."""
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Kind, Phase, Stage, Status, Table
+from brrt.planners.contract import Lattice
+from brrt.replay.checks.case import CLOSE, Case, Tally
+from brrt.replay.checks.log import text
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Cell = tuple[int, ...]
+
+_KINDS = (Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE)
+
+
+def _lattice(case: Case) -> Lattice | None:
+    """The lattice that the planner promises, if it is one to reckon with."""
+    lattice = case.contract.lattice
+    return lattice if lattice is not None and lattice.epsilon > 0 else None
+
+
+def _indices(case: Case, lattice: Lattice, q: Any) -> Ints:
+    """Integer coordinates of the cells nearest to places, shape (n, d)."""
+    cells = np.rint((np.asarray(q) - case.start) / lattice.epsilon)
+    return np.asarray(np.where(np.abs(cells) < 1 << 40, cells, 1 << 40).astype(np.int64))
+
+
+def cells_on_lattice(case: Case, tally: Tally) -> None:
+    """Every cell lies a whole number of edges from the start along each axis."""
+    lattice = _lattice(case)
+    for kind in _KINDS if lattice is not None else ():
+        assert lattice is not None  # noqa: S101 - the loop has no rounds otherwise
+        table = _with_cells(case.events[kind])
+        q = np.asarray(table["q"])
+        there = case.start + lattice.epsilon * _indices(case, lattice, q)
+        off = np.abs(q - there).max(axis=1, initial=0)
+        wrong = ~(off <= CLOSE * lattice.epsilon + case.blur)
+        tally.look(
+            table, wrong,
+            lambda i, t=table, off=off: f"cell {t['cell'][i]} is {off[i]:.3g} off the lattice",  # type: ignore[misc]
+        )  # fmt: skip
+
+
+def _with_cells(table: Table) -> Table:
+    return table[table["cell"] >= 0] if "cell" in (table.dtype.names or ()) else table
+
+
+def cells_keep_their_numbers(case: Case, tally: Tally) -> None:
+    """A number means one cell and a cell has one number; the start's is 0."""
+    lattice = _lattice(case)
+    if lattice is None:
+        return
+    tables = [_with_cells(case.events[kind]) for kind in _KINDS]
+    for table in [case.events[kind] for kind in (Kind.EXPAND, Kind.HEURISTIC)]:
+        below = table["cell"] < 0
+        tally.look(
+            table[below], below[below],
+            lambda i, t=table[below]: f"there is no cell {t['cell'][i]}",  # type: ignore[misc]
+        )  # fmt: skip
+    cell = np.concatenate([np.asarray(table["cell"], np.int64) for table in tables])
+    if not len(cell):
+        return
+    seq = np.concatenate([table["seq"] for table in tables])
+    places = np.concatenate([_indices(case, lattice, table["q"]) for table in tables])
+    order = np.argsort(seq, kind="stable")
+    cell, places = cell[order], places[order]
+    _, place = np.unique(places, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    wrong = (_first_with(cell, place) != place) | (_first_with(place, cell) != cell)
+    wrong |= (cell == 0) != (places == 0).all(axis=1)
+    heads = np.concatenate([table[["seq", "t"]] for table in tables])[order]
+    tally.look(heads, wrong, lambda i: f"number {cell[i]} and place {places[i].tolist()} disagree")
+
+
+def _first_with(keys: Ints, values: Ints) -> Ints:
+    """For each row the value that came with the first of its key, shape (n,)."""
+    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    return np.asarray(values[first][inverse.reshape(-1)])
+
+
+def _adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
+    """Whether cells are neighbours, integer coordinates of shape (n, d)."""
+    apart = np.abs(b - a)
+    if lattice.diagonals:
+        return np.asarray(apart.max(axis=1, initial=0) == 1)
+    return np.asarray(apart.sum(axis=1) == 1)
+
+
+def expansions(case: Case, tally: Tally) -> None:
+    """A cell is reached from a neighbour that its search expanded, freely; its cost is right."""
+    lattice, table = _lattice(case), case.events[Kind.EXPAND]
+    if lattice is None or not len(table):
+        return
+    parent = _parents(table)
+    root = table["parent"] < 0
+    tally.look(
+        table, (~root & (parent < 0)) | (root & (table["cost"] != 0)),
+        lambda i: (
+            f"cell {table['cell'][i]} from {table['parent'][i]} at cost {table['cost'][i]:g}: "
+            "its search has not expanded that cell"
+        ),
+    )  # fmt: skip
+    some, above = table[parent >= 0], table[parent[parent >= 0]]
+    a, b = np.asarray(above["q"]), np.asarray(some["q"])
+    apart = ~_adjacent(lattice, _indices(case, lattice, a), _indices(case, lattice, b))
+    tally.look(
+        some, apart,
+        lambda i: f"cells {above['cell'][i]} and {some['cell'][i]} are no neighbours",
+    )  # fmt: skip
+    cost = above["cost"] + case.distance(a, b)
+    tally.look(
+        some, ~case.same(some["cost"], cost),
+        lambda i: f"cell {some['cell'][i]} is said to cost {some['cost'][i]!r}, not {cost[i]!r}",
+    )  # fmt: skip
+    case.look_free(tally, some, a, b, "motion between cells")
+
+
+def _parents(table: Table) -> Ints:
+    """Row at which the same search expanded each row's parent before, or -1, shape (n,)."""
+    search = np.cumsum(table["parent"] < 0).astype(np.int64) << 32
+    cell = np.where(table["cell"] >= 0, table["cell"], (1 << 32) - 1).astype(np.int64)
+    keys = search | cell
+    order = np.argsort(keys, kind="stable")
+    wanted = search | np.maximum(table["parent"], 0)
+    at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
+    rows = order[at]
+    found = (keys[rows] == wanted) & (rows < np.arange(len(table))) & (table["parent"] >= 0)
+    return np.asarray(np.where(found, rows, -1))
+
+
+def estimates(case: Case, tally: Tally) -> None:
+    """An estimate of the cost-to-go begins as the distance to the goal, and only rises."""
+    table = case.events[Kind.HEURISTIC]
+    if _lattice(case) is None or not len(table):
+        return
+    h = np.asarray(table["h"])
+    order = np.argsort(table["cell"], kind="stable")
+    same = np.diff(table["cell"][order], prepend=-(1 << 31)) == 0
+    before = case.distance(np.asarray(table["q"]), case.goal[None])
+    before[order[same]] = h[order[np.flatnonzero(same) - 1]]
+    wrong = ~(h > before - case.blur)
+    tally.look(
+        table, wrong,
+        lambda i: f"cell {table['cell'][i]}: the estimate goes from {before[i]!r} to {h[i]!r}",
+    )  # fmt: skip
+
+
+def estimates_admissible(case: Case, tally: Tally) -> None:
+    """No estimate exceeds what a robot then spent to the goal from there, or along a path."""
+    lattice, table = _lattice(case), case.events[Kind.HEURISTIC]
+    if lattice is None or not len(table):
+        return
+    spent = _spent(case, lattice)
+    places = [tuple(p) for p in _indices(case, lattice, table["q"]).tolist()]
+    most = np.array([spent.get(place, np.inf) for place in places])
+    judged = np.isfinite(most)
+    some, limit = table[judged], most[judged]
+    tally.look(
+        some, ~case.at_most(np.asarray(some["h"]), limit),
+        lambda i: f"cell {some['cell'][i]}: {some['h'][i]!r}, but {limit[i]!r} leads to the goal",
+    )  # fmt: skip
+
+
+def _spent(case: Case, lattice: Lattice) -> dict[Cell, float]:
+    """Least cost from cells to the goal that the log itself shows."""
+    ways = [path for event, path in case.paths if event["stage"] != Stage.SMOOTHED]
+    table = case.events[Kind.MOVE]
+    for trial in np.unique(table["trial"]).tolist():
+        q = np.asarray(table["q"][table["trial"] == trial])
+        ways.append(np.concatenate([case.start[None], q]))
+    least: dict[Cell, float] = {}
+    for way in ways:
+        if not len(way) or (way[-1] != case.goal).any():
+            continue
+        cells = _indices(case, lattice, way)
+        on = np.abs(case.start + lattice.epsilon * cells - way).max(axis=1) <= (
+            CLOSE * lattice.epsilon + case.blur
+        )
+        lengths = case.distance(way[:-1], way[1:])
+        left = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+        for cell, cost, good in zip(map(tuple, cells.tolist()), left.tolist(), on, strict=True):
+            if good:
+                least[cell] = min(cost, least.get(cell, np.inf))
+    return least
+
+
+def lattice_moves(case: Case, tally: Tally) -> None:
+    """A robot on a lattice moves to a neighbour; the goal alone may be anywhere."""
+    lattice, table = _lattice(case), _planned_moves(case)
+    if lattice is None or not len(table):
+        return
+    before = _origins(case, table)
+    goal = table["cell"] < 0
+    near = _adjacent(lattice, *(_indices(case, lattice, q) for q in (before, table["q"])))
+    wrong = np.where(goal, (np.asarray(table["q"]) != case.goal).any(axis=1), ~near)
+    tally.look(
+        table, wrong,
+        lambda i: f"a move from {text(before[i])} to {text(table['q'][i])}, no neighbour",
+    )  # fmt: skip
+
+
+def _planned_moves(case: Case) -> Table:
+    """Moves that a search made itself, without a path to execute."""
+    phases, table = case.events[Kind.PHASE], case.events[Kind.MOVE]
+    begins = phases["seq"][(phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.BEGIN)]
+    return table[table["seq"] < begins[0]] if len(begins) else table
+
+
+def _origins(case: Case, table: Table) -> Floats:
+    """Where moves begin, shape (n, dof)."""
+    q = np.asarray(table["q"])
+    before = np.concatenate([case.start[None], q])[:-1]
+    before[np.diff(table["trial"], prepend=-1) != 0] = case.start
+    return before
+
+
+def choices(case: Case, tally: Tally) -> None:
+    """With a lookahead of 1 each move is to a free neighbour of least cost and estimate."""
+    lattice = _lattice(case)
+    if lattice is None or lattice.lookahead != 1:
+        return
+    walk = _Walk(case, lattice)
+    for kind, event, place in _in_order(case, lattice):
+        if kind is Kind.REJECT:
+            walk.reject(int(event["node"]), place)
+        elif kind is Kind.HEURISTIC:
+            walk.h[place] = float(event["h"])
+        elif kind is Kind.EXPAND:
+            walk.look(int(event["cell"]), place)
+        elif event["cell"] >= 0:
+            tally.one(event, walk.judge(place))
+
+
+def _in_order(case: Case, lattice: Lattice) -> Iterator[tuple[Kind, np.void, Cell]]:
+    """Yield what a search says, one after the other, with its place on the lattice."""
+    tables = {kind: case.events[kind] for kind in (Kind.REJECT, Kind.HEURISTIC, Kind.EXPAND)}
+    tables[Kind.MOVE] = _planned_moves(case)
+    rows = [
+        (int(seq), kind, event, place)
+        for kind, table in tables.items()
+        for seq, event, place in zip(
+            table["seq"], table, map(tuple, _indices(case, lattice, table["q"]).tolist()),
+            strict=True,
+        )
+    ]  # fmt: skip
+    rows.sort(key=lambda row: row[0])
+    for _, kind, event, place in rows:
+        yield kind, event, place
+
+
+class _Walk:
+    """What a robot knows that looks one cell ahead."""
+
+    def __init__(self, case: Case, lattice: Lattice) -> None:
+        self.case, self.lattice = case, lattice
+        self.h: dict[Cell, float] = {}
+        self.blocked: dict[int, set[Cell]] = {}
+        self.at: tuple[int, Cell] | None = None
+        steps = product((-1, 0, 1), repeat=len(case.start))
+        most = len(case.start) if lattice.diagonals else 1
+        self.steps = [step for step in steps if 0 < sum(map(abs, step)) <= most]
+
+    def reject(self, cell: int, place: Cell) -> None:
+        """Learn that a neighbour cannot be reached."""
+        self.blocked.setdefault(cell, set()).add(place)
+
+    def look(self, cell: int, place: Cell) -> None:
+        """Look around from a cell; its estimate is still the one from before."""
+        self.at = cell, place
+
+    def estimate(self, place: Cell) -> float:
+        """Return the estimate of the cost-to-go, which begins as the distance."""
+        if place not in self.h:
+            q = self.case.start + self.lattice.epsilon * np.array(place)
+            self.h[place] = float(self.case.distance(q[None], self.case.goal[None])[0])
+        return self.h[place]
+
+    def judge(self, target: Cell) -> str | None:
+        """Say what is wrong with a move to a cell."""
+        if self.at is None:
+            return "a move without a look around"
+        cell, place = self.at
+        self.at = None
+        blocked = self.blocked.get(cell, set())
+        if target in blocked:
+            return f"a move to {list(target)}, which was found blocked"
+        costs = {
+            other: self.lattice.epsilon * sum(map(abs, step)) ** 0.5 + self.estimate(other)
+            for step in self.steps
+            if (other := tuple(x + s for x, s in zip(place, step, strict=True))) not in blocked
+        }
+        best, chosen = min(costs.values(), default=np.inf), costs.get(target, np.inf)
+        if not self.case.at_most(np.asarray(chosen), best):
+            return f"a move of cost and estimate {chosen!r}; {best!r} was there"
+        return None
+
+
+RULES = (
+    cells_on_lattice, cells_keep_their_numbers, expansions, estimates, estimates_admissible,
+    lattice_moves, choices,
+)  # fmt: skip
+"""All rules of this file; see `brrt.replay.checks`."""

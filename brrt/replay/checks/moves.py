@@ -1,0 +1,151 @@
+"""Rules about a robot that moves: step by step, on a lattice or along its path."""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Kind, Phase, Status, Table
+from brrt.replay.checks.case import CLOSE, Case, Tally
+from brrt.replay.checks.log import text
+from brrt.replay.checks.motions import towards
+
+Floats = NDArray[np.float64]
+
+
+def _from(case: Case) -> tuple[Table, Floats, Floats, NDArray[np.bool_]]:
+    """All moves, where each begins and ends, shape (n, dof), and which are the first of a trial."""
+    table = case.events[Kind.MOVE]
+    q = np.asarray(table["q"])
+    first = np.ones(len(table), bool)
+    first[1:] = np.diff(table["trial"]) != 0
+    before = np.concatenate([q[:1], q[:-1]])
+    before[first] = case.start
+    return table, before, q, first
+
+
+def moves(case: Case, tally: Tally) -> None:
+    """Trials count 0, 1, 2 ..., and the moves of each 1, 2, 3 ..."""
+    table, _, _, first = _from(case)
+    trial = np.cumsum(first) - 1
+    starts = np.flatnonzero(first)
+    step = np.arange(len(table)) - (starts[trial] if len(table) else 0) + 1
+    wrong = (table["trial"] != trial) | (table["step"] != step)
+    tally.look(
+        table, wrong,
+        lambda i: (
+            f"step {table['step'][i]} of trial {table['trial'][i]}, "
+            f"where step {step[i]} of trial {trial[i]} is due"
+        ),
+    )  # fmt: skip
+
+
+def move_costs(case: Case, tally: Tally) -> None:
+    """A move's cost is that of the one before it and its own length."""
+    table, before, q, first = _from(case)
+    stated = np.asarray(table["cost"])
+    previous = np.concatenate([[0.0], stated])[:-1]
+    cost = np.where(first, 0.0, previous) + case.distance(before, q)
+    tally.look(
+        table, ~case.same(stated, cost),
+        lambda i: f"said to cost {stated[i]!r} so far; it costs {cost[i]!r}",
+    )  # fmt: skip
+
+
+def move_lengths(case: Case, tally: Tally) -> None:
+    """No move is longer than allowed."""
+    table, before, q, _ = _from(case)
+    length = case.distance(before, q)
+    most = _longest(case, table)
+    tally.look(
+        table, ~case.at_most(length, most),
+        lambda i: f"a move of {length[i]:.12g}; the limit is {most[i]:.12g}",
+    )  # fmt: skip
+
+
+def _executed(case: Case, table: Table) -> NDArray[np.bool_]:
+    """Which moves follow a path that stands, in a phase of its own."""
+    phases = case.events[Kind.PHASE]
+    begins = phases["seq"][(phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.BEGIN)]
+    first = int(begins[0]) if len(begins) else 1 << 62
+    return np.asarray(table["seq"] > first) & (table["cell"] < 0)
+
+
+def _longest(case: Case, table: Table) -> Floats:
+    """Longest move allowed, for each."""
+    most = np.full(len(table), np.inf)
+    lattice = case.contract.lattice
+    if lattice is not None:
+        diagonal = lattice.epsilon * (np.sqrt(case.world.dim) if lattice.diagonals else 1.0)
+        most[:] = max(lattice.max_move, diagonal)
+    most[_executed(case, table)] = case.manifest.scenario.max_move
+    return most
+
+
+def moves_free(case: Case, tally: Tally) -> None:
+    """Every move is free of obstacles."""
+    table, before, q, _ = _from(case)
+    case.look_free(tally, table, before, q, "move")
+
+
+def arrival(case: Case, tally: Tally) -> None:
+    """Where the run is solved, the last move ends at the goal."""
+    table = case.events[Kind.MOVE]
+    if len(table) and case.outcome is Status.SOLVED:
+        there = (np.asarray(table["q"][-1]) == case.goal).all()
+        wrong = f"the last move ends at {text(table['q'][-1])}, not at the goal"
+        tally.one(table[-1], None if there else wrong)
+
+
+def moves_along_path(case: Case, tally: Tally) -> None:
+    """A robot that executes a path moves along it, forwards, and cuts no corner."""
+    table, before, q, _ = _from(case)
+    chosen = _executed(case, table)
+    if not chosen.any():
+        return
+    if not case.paths:
+        tally.one(table[chosen][0], "a move without a path")
+        return
+    path = _Polyline(case, case.paths[-1][1])
+    at = 0.0
+    for event, a, b in zip(table[chosen], before[chosen], q[chosen], strict=True):
+        if (a == case.start).all():
+            at = 0.0
+        on = path.along(b, at)
+        length = float(case.distance(a[None], b[None])[0])
+        wrong = None
+        if on is None:
+            wrong = f"{text(b)} is not ahead on the path"
+        elif abs(on - at - length) > CLOSE * path.length + case.blur:
+            wrong = f"{text(b)} lies {on - at:.12g} ahead on the path, but {length:.12g} away"
+        at = at if on is None else on
+        tally.one(event, wrong)
+
+
+class _Polyline:
+    """A path, to find places on."""
+
+    def __init__(self, case: Case, path: Floats) -> None:
+        self.case, self.path = case, path
+        self.steps = towards(case.robot, path[:-1], path[1:])
+        self.ends = np.concatenate([[0.0], np.cumsum(case.distance(path[:-1], path[1:]))])
+        self.length = float(self.ends[-1])
+
+    def along(self, q: Floats, least: float) -> float | None:
+        """Say how far along the path a place is, `least` or farther; None where it is not."""
+        slack = CLOSE * self.length + self.case.blur
+        for i, (begin, end) in enumerate(pairwise(map(float, self.ends))):
+            if end < least - slack:
+                continue
+            offset = towards(self.case.robot, self.path[i][None], q[None])[0]
+            square = float(self.steps[i] @ self.steps[i])
+            part = min(max(float(offset @ self.steps[i]) / square, 0.0), 1.0) if square else 0.0
+            apart = np.abs(offset - part * self.steps[i]).max()
+            at = float(begin + part * (end - begin))
+            if apart <= slack and at >= least - slack:
+                return max(at, least)
+        return None
+
+
+RULES = (moves, move_costs, move_lengths, moves_free, arrival, moves_along_path)
+"""All rules of this file; see `brrt.replay.checks`."""

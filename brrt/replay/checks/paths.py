@@ -1,0 +1,197 @@
+"""Rules about paths: from start to goal, free, along the trees, and what the smoother made."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Kind, Stage
+from brrt.replay.checks.case import Case, Tally
+from brrt.replay.checks.log import text
+from brrt.replay.ledger import SOUND
+
+Floats = NDArray[np.float64]
+Place = tuple[float, ...]
+
+
+def path_ends(case: Case, tally: Tally) -> None:
+    """Paths lead from the start to the goal."""
+    for event, path in case.paths:
+        wrong = None
+        if not len(path):
+            wrong = "a path without waypoints"
+        elif (path[0] != case.start).any():
+            wrong = f"begins at {text(path[0])}; the start is {text(case.start)}"
+        elif (path[-1] != case.goal).any():
+            wrong = f"ends at {text(path[-1])}; the goal is {text(case.goal)}"
+        tally.one(event, wrong)
+
+
+def paths_free(case: Case, tally: Tally) -> None:
+    """Every motion of every path is free of obstacles."""
+    for event, path in case.paths:
+        hit = case.blocked(path[:-1], path[1:])
+        bad = np.flatnonzero(hit >= 0)
+        name = case.obstacles.name(int(hit[bad[0]])) if len(bad) else ""
+        tally.one(event, f"motion {bad[0]} hits {name}" if len(bad) else None)
+
+
+def path_costs(case: Case, tally: Tally) -> None:
+    """A path's cost is its length in the robot's metric."""
+    for event, path in case.paths:
+        length, stated = case.distance(path[:-1], path[1:]).sum(), float(event["cost"])
+        right = bool(case.same(np.asarray(stated), np.asarray(length)))
+        said = f"said to cost {stated!r}; it is {float(length)!r} long"
+        tally.one(event, None if right else said)
+
+
+def paths_improve(case: Case, tally: Tally) -> None:
+    """Of the paths that a planner finds, each costs less than the one before."""
+    before = None
+    for event, _ in case.found:
+        cost = float(event["cost"])
+        if before is not None and event["stage"] == Stage.IMPROVED:
+            tally.one(event, None if cost < before else f"cost {cost!r} after {before!r}")
+        before = cost
+
+
+def paths_in_trees(case: Case, tally: Tally) -> None:
+    """The motions of a tree planner's path are edges, as parents were then, or links."""
+    if not case.known or not len(case.events[Kind.EDGE]):
+        return
+    wanted = {place for _, path in case.found for place in _places(path)}
+    trees = [_Parents(case, number, wanted) for number in range(len(case.trees))]
+    links = _links(case, trees)
+    for event, path in case.found:
+        for tree in trees:
+            tree.advance(int(event["seq"]))
+        places = _places(path)
+        loose = [
+            i
+            for i, (a, b) in enumerate(pairwise(places))
+            if not (
+                any(tree.joins(a, b) for tree in trees) or links.get((a, b), 1 << 62) < event["seq"]
+            )
+        ]
+        tally.one(event, f"motion {loose[0]} is no edge of a tree and no link" if loose else None)
+
+
+def _places(path: Any) -> list[Place]:
+    """Configurations as keys."""
+    return [tuple(q) for q in np.asarray(path).tolist()]
+
+
+class _Parents:
+    """The parents of a tree as they stand at some event, and which nodes are at some places."""
+
+    def __init__(self, case: Case, number: int, wanted: set[Place]) -> None:
+        tree = case.trees[number]
+        self.q = np.asarray(tree.edges["q"])
+        self.made = tree.made
+        self.sound = (tree.ledger.verdict == SOUND) & (tree.made.parent >= 0)
+        self.parent = np.full(len(tree.edges), -1, np.int64)
+        self.done = 0
+        self.nodes: dict[Place, list[int]] = {}
+        # Looking at one coordinate first leaves few of a large tree's nodes.
+        near = np.flatnonzero(np.isin(self.q[:, 0], [place[0] for place in wanted]))
+        for node, place in zip(near.tolist(), _places(self.q[near]), strict=True):
+            if place in wanted:
+                self.nodes.setdefault(place, []).append(node)
+
+    def advance(self, seq: int) -> None:
+        """Make the changes up to an event."""
+        end = int(np.searchsorted(self.made.seq, seq))
+        some = np.arange(self.done, end)[self.sound[self.done : end]]
+        # Of several parents of one node numpy keeps the last.
+        self.parent[self.made.node[some]] = self.made.parent[some]
+        self.done = max(self.done, end)
+
+    def joins(self, a: Place, b: Place) -> bool:
+        """Whether one of the places is the other's parent."""
+        ours, theirs = self.nodes.get(a, []), self.nodes.get(b, [])
+        up = {(node, int(self.parent[node])) for node in ours + theirs}
+        return any((x, y) in up or (y, x) in up for x in ours for y in theirs)
+
+
+def _links(case: Case, trees: list[_Parents]) -> dict[tuple[Place, Place], int]:
+    """Pairs of places that a link joins, and the number of its event."""
+    by_number = {tree.number: at.q for tree, at in zip(case.trees, trees, strict=True)}
+    found: dict[tuple[Place, Place], int] = {}
+    for link in case.events[Kind.CONNECT]:
+        ends = []
+        for number, name in ((0, "node"), (1, "other")):
+            q = by_number.get(number, np.empty((0, case.events.dof)))
+            if 0 <= link[name] < len(q):
+                ends.append(tuple(q[link[name]].tolist()))
+        if len(ends) == 2:
+            found.setdefault((ends[0], ends[1]), int(link["seq"]))
+            found.setdefault((ends[1], ends[0]), int(link["seq"]))
+    return found
+
+
+def shortcuts(case: Case, tally: Tally) -> None:
+    """Shortcuts replace what lies between two waypoints by a free motion; the cost never rises."""
+    table = case.events[Kind.SHORTCUT]
+    path, cost, due = np.empty((0, case.events.dof)), np.inf, list(case.found)
+    for event in table:
+        while due and due[0][0]["seq"] < event["seq"]:
+            first, path = due.pop(0)
+            cost = float(first["cost"])
+        wrong, path = _attempt(case, event, path, cost)
+        tally.one(event, wrong)
+        cost = float(event["cost"])
+
+
+def _attempt(case: Case, event: Any, path: Floats, cost: float) -> tuple[str | None, Floats]:
+    """Make one attempt; return what is wrong with it, and the path after it."""
+    i, j = int(event["i"]), int(event["j"])
+    if not 0 <= i < j < len(path):
+        return f"waypoints {i} and {j} are no pair of a path with {len(path)}", path
+    if event["accepted"] and (hit := int(case.blocked(path[i][None], path[j][None])[0])) >= 0:
+        name = case.obstacles.name(hit)
+        return f"the motion from waypoint {i} to {j} hits {name}", path
+    if event["accepted"]:
+        path = np.concatenate([path[: i + 1], path[j:]])
+    after = float(event["cost"])
+    length = np.asarray(case.distance(path[:-1], path[1:]).sum())
+    if not after <= cost * (1 + 1e-12):
+        return f"the cost rises from {cost!r} to {after!r}", path
+    if not case.same(np.asarray(after), length):
+        return f"said to cost {after!r}; the path is {float(length)!r} long", path
+    return None, path
+
+
+def smoothed(case: Case, tally: Tally) -> None:
+    """The smoothed path is what the accepted shortcuts leave; it costs no more."""
+    table, raw = case.events[Kind.SHORTCUT], None
+    done = 0
+    for event, path in case.paths:
+        if event["stage"] != Stage.SMOOTHED:
+            raw = (float(event["cost"]), path)
+            continue
+        end = int(np.searchsorted(table["seq"], event["seq"]))
+        attempts, done = table[done:end], end
+        if raw is None:
+            tally.one(event, "there was no path to smooth")
+            continue
+        left = _shortened(raw[1], attempts)
+        wrong = None if np.array_equal(left, path) else "not the path that the shortcuts leave"
+        if not float(event["cost"]) <= raw[0] * (1 + 1e-12):
+            wrong = f"costs {float(event['cost'])!r}, more than {raw[0]!r} before"
+        tally.one(event, wrong)
+
+
+def _shortened(path: Floats, attempts: NDArray[np.void]) -> Floats:
+    """Make the accepted shortcuts that can be made."""
+    for event in attempts[attempts["accepted"]]:
+        i, j = int(event["i"]), int(event["j"])
+        if 0 <= i < j < len(path):
+            path = np.concatenate([path[: i + 1], path[j:]])
+    return path
+
+
+RULES = (
+    path_ends, paths_free, path_costs, paths_improve, paths_in_trees, shortcuts, smoothed,
+)  # fmt: skip
+"""All rules of this file; see `brrt.replay.checks`."""

@@ -1,0 +1,192 @@
+"""Rules about trees: nodes and parents, costs at every moment, rewires, links."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Kind, Table
+from brrt.replay.checks.case import Case, Tally
+from brrt.replay.checks.log import text
+from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions, fold
+
+Floats = NDArray[np.float64]
+
+
+def nodes(case: Case, tally: Tally) -> None:
+    """Nodes join a tree as 0, 1, 2 ... below a node that is there."""
+    for tree in case.trees:
+        edges, verdict = tree.edges, tree.of_edges(tree.ledger.verdict)
+        misnumbered = edges["node"] != np.arange(len(edges))
+        tally.look(
+            edges, misnumbered | (verdict != SOUND),
+            lambda i, e=edges, m=misnumbered: (  # type: ignore[misc]
+                f"node {e['node'][i]} joins tree {e['tree'][i]} as its node {i}" if m[i]
+                else f"node {i} gets parent {e['parent'][i]}, which is not there"
+            ),
+        )  # fmt: skip
+
+
+def roots(case: Case, tally: Tally) -> None:
+    """Each tree has one root, its first node, at cost 0: the start, or in tree 1 the goal."""
+    for tree in case.trees:
+        edges = tree.edges
+        root = edges["parent"] < 0
+        first = np.arange(len(edges)) == 0
+        wanted = {0: case.start, 1: case.goal}.get(tree.number)
+        wrong = root != first
+        wrong |= root & (edges["cost"] != 0)
+        if wanted is not None:
+            wrong |= root & (np.asarray(edges["q"]) != wanted).any(axis=1)
+        looked = root | first
+        some, bad = edges[looked], wrong[looked]
+        tally.look(
+            some, bad,
+            lambda i, e=some: (  # type: ignore[misc]
+                f"root {e['node'][i]} of tree {e['tree'][i]} at {text(e['q'][i])}, "
+                f"parent {e['parent'][i]}, cost {e['cost'][i]:g}"
+            ),
+        )  # fmt: skip
+
+
+def edge_lengths(case: Case, tally: Tally) -> None:
+    """Edges are no longer than the step; to the goal they may be, by line of sight."""
+    step = case.contract.step
+    for tree in case.trees if step is not None else ():
+        edges, length = tree.edges, tree.of_edges(tree.length)
+        there = np.isfinite(length) | (edges["parent"] >= 0)
+        wrong = (
+            there & ~case.at_most(length, step or 0.0) & (tree.of_edges(tree.ledger.verdict) == 0)
+        )
+        if case.contract.line_of_sight:
+            wrong &= (np.asarray(edges["q"]) != case.goal).any(axis=1)
+        tally.look(
+            edges[there], wrong[there],
+            lambda i, n=length[there]: f"edge of {n[i]:.12g}; the step is {step:.12g}",  # type: ignore[misc]
+        )  # fmt: skip
+
+
+def edge_costs(case: Case, tally: Tally) -> None:
+    """A node's cost is its parent's at that moment and the distance between them."""
+    for tree in case.trees:
+        sound = tree.of_edges((tree.ledger.verdict == SOUND) & (tree.made.parent >= 0))
+        cost = tree.of_edges(tree.ledger.parent_cost + tree.length)[sound]
+        _look_cost(case, tally, tree.edges[sound], cost)
+
+
+def edges_free(case: Case, tally: Tally) -> None:
+    """Every edge of a tree is free of obstacles."""
+    for tree in case.trees:
+        sound = tree.of_edges((tree.ledger.verdict == SOUND) & (tree.made.parent >= 0))
+        edges, q = tree.edges[sound], np.asarray(tree.edges["q"])
+        case.look_free(tally, edges, q[edges["parent"]], q[sound], "edge")
+
+
+def rewires(case: Case, tally: Tally) -> None:
+    """A rewire gives a node that is there a parent that is there and not its descendant."""
+    for tree in case.trees:
+        verdict = tree.of_rewires(tree.ledger.verdict)
+        table = tree.rewires
+        tally.look(table, verdict != SOUND, lambda i, t=table, v=verdict: _why(t[i], int(v[i])))  # type: ignore[misc]
+
+
+def _why(rewire: np.void, verdict: int) -> str:
+    node, parent = int(rewire["node"]), int(rewire["parent"])
+    return {
+        NO_PARENT: f"node {node} gets parent {parent}, which is not there",
+        NO_NODE: f"node {node} is rewired before it is there",
+        CIRCLE: f"with parent {parent}, node {node} is its own ancestor",
+    }[verdict]
+
+
+def rewire_costs(case: Case, tally: Tally) -> None:
+    """A rewired node's cost is its new parent's at that moment and the distance between them."""
+    for tree in case.trees:
+        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
+        cost = tree.of_rewires(tree.ledger.parent_cost + tree.length)[sound]
+        _look_cost(case, tally, tree.rewires[sound], cost)
+
+
+def _look_cost(case: Case, tally: Tally, table: Table, cost: Floats) -> None:
+    stated = np.asarray(table["cost"])
+    tally.look(
+        table, ~case.same(stated, cost),
+        lambda i: f"node {table['node'][i]} is said to cost {stated[i]!r}; it costs {cost[i]!r}",
+    )  # fmt: skip
+
+
+def rewires_gain(case: Case, tally: Tally) -> None:
+    """A rewire never makes a node dearer."""
+    for tree in case.trees:
+        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
+        table, before = tree.rewires[sound], tree.of_rewires(tree.ledger.before)[sound]
+        after = tree.of_rewires(tree.ledger.parent_cost + tree.length)[sound]
+        tally.look(
+            table, ~case.at_most(after, before),
+            lambda i, t=table, b=before, a=after: (  # type: ignore[misc]
+                f"node {t['node'][i]} cost {b[i]:.12g} before, {a[i]:.12g} now"
+            ),
+        )  # fmt: skip
+
+
+def rewires_near(case: Case, tally: Tally) -> None:
+    """A rewire's new parent is within the radius that the planner promises."""
+    near = case.contract.near
+    for tree in case.trees if near is not None else ():
+        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
+        nodes = tree.of_rewires(np.cumsum(tree.made.joins))[sound]
+        radius = near.radius(nodes) if near is not None else nodes
+        length, table = tree.of_rewires(tree.length)[sound], tree.rewires[sound]
+        tally.look(
+            table, ~case.at_most(length, radius),
+            lambda i, n=length, r=radius: f"a parent {n[i]:.12g} away; the radius is {r[i]:.12g}",  # type: ignore[misc]
+        )  # fmt: skip
+
+
+def rewires_free(case: Case, tally: Tally) -> None:
+    """The edge to a new parent is free of obstacles."""
+    for tree in case.trees:
+        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
+        table, q = tree.rewires[sound], np.asarray(tree.edges["q"])
+        case.look_free(tally, table, q[table["parent"]], q[table["node"]], "edge")
+
+
+def links(case: Case, tally: Tally) -> None:
+    """A link joins nodes that are there, is no longer than promised and free; its cost is right."""
+    table = case.events[Kind.CONNECT]
+    ends = [_asked(case, number, table, name) for number, name in ((0, "node"), (1, "other"))]
+    (a, cost_a), (b, cost_b) = ends
+    there = np.isfinite(cost_a) & np.isfinite(cost_b)
+    tally.look(
+        table, ~there,
+        lambda i: f"nodes {table['node'][i]} and {table['other'][i]} are not both there",
+    )  # fmt: skip
+    sound, a, b = table[there], a[there], b[there]
+    length = case.distance(a, b)
+    cost = (cost_a + cost_b)[there] + length
+    if case.contract.link is not None:
+        limit = case.contract.link
+        long = ~case.at_most(length, limit)
+        tally.look(sound, long, lambda i: f"link of {length[i]:.12g}; the limit is {limit:.12g}")
+    tally.look(
+        sound, ~case.same(np.asarray(sound["cost"]), cost),
+        lambda i: f"said to cost {sound['cost'][i]!r}; it costs {cost[i]!r}",
+    )  # fmt: skip
+    case.look_free(tally, sound, a, b, "link")
+
+
+def _asked(case: Case, number: int, table: Table, name: str) -> tuple[Floats, Floats]:
+    """Where the ends of links in a tree are, and what they cost then; nan where they are not."""
+    q, cost = np.full((len(table), case.events.dof), np.nan), np.full(len(table), np.nan)
+    for tree in case.trees:
+        if tree.number == number and len(table):
+            node = table[name].astype(np.int64)
+            cost = fold(tree.made, tree.length, Questions(table["seq"], node)).answers
+            there = np.isfinite(cost)
+            q[there] = tree.edges["q"][node[there]]
+    return q, cost
+
+
+RULES = (
+    nodes, roots, edge_lengths, edge_costs, edges_free,
+    rewires, rewire_costs, rewires_gain, rewires_near, rewires_free, links,
+)  # fmt: skip
+"""All rules of this file; see `brrt.replay.checks`."""

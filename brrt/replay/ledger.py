@@ -1,0 +1,236 @@
+"""Costs as they stood at each moment of a tree that rewires: a fold, one event after another."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Events, Kind
+from brrt.kernels.jit import borrowing, kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+Distance = Callable[[Floats, Floats], Floats]
+"""A robot's metric: distances between rows of configurations, shapes (m, dof) to (m,)."""
+
+SOUND, NO_PARENT, NO_NODE, CIRCLE = range(4)
+"""Whether a change could be made: all is well, the new parent does not exist (yet), the rewired
+node does not exist (yet), the new parent descends from the node."""
+
+
+class Changes(NamedTuple):
+    """What happens to one tree, in order; node n is the one that the n-th edge made.
+
+    Attributes:
+        seq: Number of the event, shape (m,).
+        node: Which node joins or is rewired, shape (m,).
+        parent: Its parent from now on; below 0 for a root; shape (m,).
+        stated: Its cost-to-come, as the event states it, shape (m,).
+        joins: Whether the node joins the tree (an edge) or was there (a rewire), shape (m,).
+    """
+
+    seq: Ints
+    node: Ints
+    parent: Ints
+    stated: Floats
+    joins: NDArray[np.bool_]
+
+
+class Ledger(NamedTuple):
+    """The tree after all changes, and how each change found it.
+
+    Attributes:
+        parent: Parents, shape (n,).
+        cost: Costs-to-come, shape (n,).
+        parent_cost: Cost of the parent when the change was made, nan without one, shape (m,).
+        before: Cost of the node right before the change, nan where it joins, shape (m,).
+        verdict: Whether the change could be made; one that could not is left out; shape (m,).
+        answers: What the nodes that were asked for cost then, nan where they were not there.
+    """
+
+    parent: Ints
+    cost: Floats
+    parent_cost: Floats
+    before: Floats
+    verdict: NDArray[np.uint8]
+    answers: Floats
+
+
+def changes(events: Events, tree: int) -> Changes:
+    """Merge the edges and rewires of a tree in the order of the log."""
+    edges, rewires = (table[table["tree"] == tree] for table in _both(events))
+    seq = np.concatenate([edges["seq"], rewires["seq"]])
+    order = np.argsort(seq, kind="stable")
+    joins = order < len(edges)
+    node = np.concatenate([np.arange(len(edges)), rewires["node"]])
+    parent = np.concatenate([edges["parent"], rewires["parent"]]).astype(np.int64)
+    stated = np.concatenate([edges["cost"], rewires["cost"]])
+    return Changes(seq[order], node[order].astype(np.int64), parent[order], stated[order], joins)
+
+
+def _both(events: Events) -> tuple[NDArray[np.void], NDArray[np.void]]:
+    return events[Kind.EDGE], events[Kind.REWIRE]
+
+
+def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
+    """Measure the edge that each change makes, shape (m,); nan for roots and for what is no node.
+
+    Args:
+        q: Configurations of the nodes, shape (n, dof).
+        made: The changes.
+        distance: The robot's metric.
+    """
+    n, length = len(q), np.full(len(made.seq), np.nan)
+    there = (made.parent >= 0) & (made.parent < n) & (made.node >= 0) & (made.node < n)
+    length[there] = distance(q[made.parent[there]], q[made.node[there]])
+    return length
+
+
+class Questions(NamedTuple):
+    """What nodes cost at certain moments, to be answered on the way.
+
+    Attributes:
+        seq: After the events up to this one, rising, shape (k,).
+        node: Of which node, shape (k,).
+    """
+
+    seq: Ints
+    node: Ints
+
+
+NONE = Questions(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -> Ledger:
+    """Make the changes one after another; the costs of all descendants follow each.
+
+    Args:
+        made: The changes.
+        length: Length of the edge that each change makes, shape (m,). By default it is what the
+            event states less the parent's cost at that moment, which is right to a rounding of
+            the cost; so costs are right to about depth roundings.
+        asked: Questions.
+    """
+    nodes = int(made.joins.sum())
+    if length is None:
+        length = np.full(len(made.seq), np.nan)
+    parent, links = np.full(nodes, -1, np.int64), np.full((nodes, 3), -1, np.int64)
+    cost, lengths = np.zeros(nodes), np.zeros(nodes)
+    parent_cost, before = np.full(len(made.seq), np.nan), np.full(len(made.seq), np.nan)
+    verdict = np.zeros(len(made.seq), np.uint8)
+    answers = np.full(len(asked.seq), np.nan)
+    moments = np.searchsorted(made.seq, asked.seq, side="right")
+    _fold(
+        moments, np.asarray(asked.node, np.int64), answers,
+        made.node, made.parent, made.stated, made.joins, np.ascontiguousarray(length, np.float64),
+        parent, links, cost, lengths, parent_cost, before, verdict,
+    )  # fmt: skip
+    return Ledger(parent, cost, parent_cost, before, verdict, answers)
+
+
+_CHILD, _NEXT, _LAST = range(3)
+"""Columns of the links: a node's first child, its next sibling, its sibling before."""
+
+
+@borrowing
+def _below(root: int, at: int, parent: Ints, links: Ints) -> int:
+    """Return the descendant of `root` that comes after `at` on a walk from above, or -1."""
+    if links[at, _CHILD] >= 0:
+        return int(links[at, _CHILD])
+    while at != root and links[at, _NEXT] < 0:
+        at = parent[at]
+    return -1 if at == root else int(links[at, _NEXT])
+
+
+@borrowing
+def _descends(root: int, node: int, parent: Ints) -> bool:
+    """Whether `node` is `root` or below it."""
+    while node not in (-1, root):
+        node = parent[node]
+    return node == root
+
+
+@borrowing
+def _leave(v: int, parent: Ints, links: Ints) -> None:
+    """Take a node from among its parent's children."""
+    after, ahead = links[v, _NEXT], links[v, _LAST]
+    if ahead >= 0:
+        links[ahead, _NEXT] = after
+    elif parent[v] >= 0:
+        links[parent[v], _CHILD] = after
+    if after >= 0:
+        links[after, _LAST] = ahead
+
+
+@borrowing
+def _join(v: int, p: int, parent: Ints, links: Ints) -> None:
+    """Put a node first among a parent's children."""
+    first = links[p, _CHILD]
+    parent[v] = p
+    links[p, _CHILD], links[v, _NEXT], links[v, _LAST] = v, first, -1
+    if first >= 0:
+        links[first, _LAST] = v
+
+
+@borrowing
+def _answer(
+    question: int, i: int, moments: Ints, asked: Ints, answers: Floats, cost: Floats, born: int
+) -> int:
+    """Answer what is asked after i changes, from `question` on; return the next question."""
+    while question < len(asked) and moments[question] <= i:
+        if 0 <= asked[question] < born:
+            answers[question] = cost[asked[question]]
+        question += 1
+    return question
+
+
+@kernel
+def _fold(
+    moments: Ints,
+    asked: Ints,
+    answers: Floats,
+    node: Ints,
+    new_parent: Ints,
+    stated: Floats,
+    joins: NDArray[np.bool_],
+    length: Floats,
+    parent: Ints,
+    links: Ints,
+    cost: Floats,
+    lengths: Floats,
+    parent_cost: Floats,
+    before: Floats,
+    verdict: NDArray[np.uint8],
+) -> None:
+    """See `fold`; a question waits for its number of changes; from `parent` on it writes."""
+    born, question = 0, 0
+    for i in range(len(node)):
+        question = _answer(question, i, moments, asked, answers, cost, born)
+        v, p = node[i], new_parent[i]
+        if joins[i]:
+            born += 1
+            cost[v] = stated[i]
+        elif not 0 <= v < born:
+            verdict[i] = NO_NODE
+            continue
+        else:
+            before[i] = cost[v]
+        if not 0 <= p < born or (joins[i] and p == v):
+            verdict[i] = SOUND if p < 0 and joins[i] else NO_PARENT
+            continue
+        parent_cost[i] = cost[p]
+        if not joins[i]:
+            if _descends(v, p, parent):
+                verdict[i] = CIRCLE
+                continue
+            _leave(v, parent, links)
+        _join(v, p, parent, links)
+        lengths[v] = stated[i] - cost[p] if np.isnan(length[i]) else length[i]
+        cost[v] = cost[p] + lengths[v]
+        at = _below(v, v, parent, links)
+        while at >= 0:
+            cost[at] = cost[parent[at]] + lengths[at]
+            at = _below(v, at, parent, links)
+    _answer(question, len(node), moments, asked, answers, cost, born)
