@@ -314,7 +314,8 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
         rrb.Horizontal(_world_view(manifest, world), right, column_shares=[5, 2]),
         rrb.TimePanel(
             state="collapsed",
-            timeline="iteration",
+            # A robot that drives the path afterwards does so within the planner's last iteration.
+            timeline="event" if manifest.scenario.execute else "iteration",
             play_state="following" if live else "paused",
             fps=100,
         ),

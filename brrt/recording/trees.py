@@ -11,6 +11,7 @@ from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows, merged, moments
 from brrt.recording.fading import Fading
 from brrt.recording.pages import Pages
+from brrt.recording.paths import draw_bodies
 from brrt.recording.sketch import DRAWN_IN_FULL, Sketch
 
 _LINKS_IN_FULL, _LINK_STRIDE = 10_000, 16
@@ -89,6 +90,7 @@ class _Tree:
     def draw(self, edges: Table, rewires: Table) -> None:
         """Draw the tree's events of a batch."""
         which = self._join(edges) if len(edges) else np.zeros(0, np.int64)
+        self._draw_newest(edges)
         if self._pages is None and len(rewires):
             self._turn_to_pages(edges[which], rewires)
         if self._pages is not None:
@@ -122,6 +124,15 @@ class _Tree:
             limit = f"beyond {DRAWN_IN_FULL:,} nodes only edges to new places are drawn"
             canvas.tell(edges[-1], f"{self._name} tree: {limit}")
         return which
+
+    def _draw_newest(self, edges: Table) -> None:
+        """Show the body at the newest node, now and then."""
+        if len(edges) and self._canvas.robot.outline(edges["q"][0]):
+            ends = growing_rows(self._sketch.nodes - len(edges), len(edges))
+            rows, entity = edges[ends - 1], f"/world/newest/{self._name}"
+            if self._sketch.nodes == len(edges):
+                self._canvas.style(entity, self._canvas.lines, scene.NEWEST, -0.75, 50.0)
+            draw_bodies(self._canvas, entity, rows, [[q] for q in rows["q"]])
 
     def _turn_to_pages(self, edges: Table, rewires: Table) -> None:
         """Take what was drawn before this batch over to pages."""
