@@ -8,13 +8,13 @@ import pytest
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
-from brrt import Events, Kind, McapSink, Memory, Run, Scenario, forest, read
+from brrt import Events, Kind, McapSink, Memory, Run, Scenario, Sink, forest, read
 from brrt.events import Table, table_dtype
 from brrt.recording import fading, pages, paths, scene
 from brrt.recording.rerun import RerunSink
 
 SQUARES = "squares2d:n=30,seed=3"
-PLANNERS = {
+PLANNERS: dict[str, dict[str, Any]] = {
     "rrt": {},
     "rrt-connect": {},
     "bi-rrt": {},
@@ -68,7 +68,7 @@ def as_set(lines: Any) -> set[tuple[float, ...]]:
 
 def shown(found: dict[str, list[tuple[int, Any]]], seq: int) -> list[Any]:
     """What a viewer shows of pages with the cursor at an event: the newest row of each."""
-    items = []
+    items: list[Any] = []
     for page in found.values():
         up_to_now = [value for at, value in page if at <= seq]
         items += up_to_now[-1] if up_to_now else []
@@ -264,7 +264,7 @@ def test_round_trip_of_every_planner(planner: str, tmp_path: Path) -> None:
     """Both formats give back the same log, and the picture takes its place within bounds."""
     run = Run(scenario(planner, execute=True))
     files = [tmp_path / "run.mcap", tmp_path / "run.rrd"]
-    sinks = [
+    sinks: list[Sink] = [
         McapSink(files[0], run.manifest, run.problem.world),
         RerunSink(run.manifest, run.problem.world, path=files[1]),
     ]

@@ -25,7 +25,7 @@ class Moves:
         self._canvas, self._thinning = canvas, Thinning(canvas.world)
         self._start = canvas.places([manifest.start])
         self._at, self._drawn = self._start, 0
-        canvas.style(scene.TRACE_ENTITY, canvas.lines, scene.TRACE, -1, 28.0)
+        canvas.style(scene.TRACE_ENTITY, canvas.lines, scene.TRACE, -0.5, 28.0)
         canvas.style(scene.ROBOT_ENTITY, canvas.points, scene.ROBOT, -5, 60.0)
         if canvas.dim == 2:
             canvas.style(scene.BODY_ENTITY, canvas.lines, scene.ROBOT, -1.5, 55.0)

@@ -43,7 +43,7 @@ REWIRED: Mapping[str, Colour] = {"start": (150, 235, 255), "goal": (255, 190, 22
 """New edges of the trees of these names, for a moment."""
 LINK: Colour = (255, 236, 170)
 GHOST: Colour = (150, 128, 60)
-TRACE: Colour = (235, 235, 240)
+TRACE: Colour = (205, 205, 215)
 ROBOT: Colour = (255, 255, 255)
 NEWEST: Colour = (120, 170, 235)
 LINK_ENTITY, GHOSTS_ENTITY = "/world/link", "/world/path/bodies"
@@ -64,6 +64,8 @@ _PATHS: Mapping[Stage, tuple[Colour, float]] = {
 }
 FADING_ITERATIONS, FADING_EVENTS, FADING_SECONDS = 300, 1000, 0.001
 """How long samples and rejections stay in sight on each timeline."""
+_BRIEFER = 5
+"""Rewired edges stay for a part of that: there may be several in an iteration."""
 
 _LAYERS, _OVERLAP = 5, 1.5
 """Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
@@ -332,8 +334,13 @@ def _world_view(manifest: Manifest, world: World) -> Any:
         ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS)),
     ]
     shown = {f"/world/tree/{name}": past for name, _ in _TREES.values()}
+    just_now = [
+        ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS // _BRIEFER)),
+        ("event", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_EVENTS // _BRIEFER)),
+        ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS / _BRIEFER)),
+    ]
     shown |= dict.fromkeys(_GROWING, past)
-    shown |= {f"/world/rewired/{name}": recent for name in REWIRED}
+    shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
     options: dict[str, Any] = {
