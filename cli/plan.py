@@ -36,14 +36,16 @@ def plan(
     start: Annotated[
         str | None,
         typer.Option(
-            help="Start configuration, as 5,5 or 1,2,3.",
+            help="Start configuration, as 5,5 or 1,2,3, or random: a free one, from the seed.",
             metavar="X,Y[,Z]",
             rich_help_panel="Problem",
         ),
     ] = None,
     goal: Annotated[
         str | None,
-        typer.Option(help="Goal configuration.", metavar="X,Y[,Z]", rich_help_panel="Problem"),
+        typer.Option(
+            help="Goal configuration, or random.", metavar="X,Y[,Z]", rich_help_panel="Problem"
+        ),
     ] = None,
     planner: Annotated[
         str | None,
