@@ -152,7 +152,7 @@ def advance(
         for k in range(len(space.lower)):
             reached = reached and scratch[_NEW, k] == scratch[_TARGET, k]
         reason, more = -1, False
-        if far == 0.0 and not linking:
+        if far == 0.0 and not (linking and reached):
             reason = NO_PROGRESS
         elif not segment_free(space, forest.q, near, scratch, _NEW):
             reason = LINK_BLOCKED if linking and reached else COLLISION
