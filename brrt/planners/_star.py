@@ -377,12 +377,14 @@ def advance(
     counts = star.counts
     if counts[STAGE] == _BEGIN:
         emit_roots(star.forest, log)
-        counts[STAGE] = _DRAW
+        if len(star.forest.nodes) > 2:
+            link(star, space, log, options)
+        counts[STAGE] = _TELL
     while True:
         if counts[STAGE] == _TELL:
             if not tell(star, space, log):
                 return BATCH_FULL
-            counts[COUNTED] += 1
+            counts[COUNTED] = counts[DRAWS]
             counts[STAGE] = _DRAW
             if options.stop_at_first and counts[PATHS] > 0:
                 emit_solved(log, counts[DRAWS])
