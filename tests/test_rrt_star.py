@@ -1,0 +1,216 @@
+"""What RRT* promises, with one tree and with two, proven from its events alone."""
+
+from typing import Any
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
+from brrt.planners import Contract
+from brrt.run import Run
+from brrt.scenario import Scenario
+
+from . import naive, twins
+from .test_rrt import FEW, ROUNDING, check_log, plain, planned, status
+
+Floats = NDArray[np.float64]
+
+
+def promise(run: Run) -> Contract:
+    """What the planner says that it can be held to."""
+    return run.manifest.scenario.make_planner().contract(run.problem)
+
+
+def is_double(run: Run) -> bool:
+    """Whether there are two trees."""
+    return run.manifest.scenario.planner == "bi-rrt-star"
+
+
+def distances(a: Floats, b: Floats) -> Floats:
+    """Distances between two rows of configurations, pair by pair."""
+    return np.sqrt(((b - a) ** 2).sum(axis=1))
+
+
+class Fold:
+    """Trees as they stand after each event; costs are worked out anew from parents alone."""
+
+    def __init__(self, run: Run, events: Events) -> None:
+        self.run, self.world, self.promise = run, run.problem.world, promise(run)
+        edges = events[Kind.EDGE]
+        trees = [edges[edges["tree"] == tree] for tree in range(1 + is_double(run))]
+        self.q = [edges["q"] for edges in trees]
+        self.parent: list[dict[int, int]] = [{} for _ in trees]
+        self.links: list[tuple[int, int]] = []
+        self.best = np.inf
+
+    def cost(self, tree: int, node: int) -> float:
+        """Length of the branch to a node; a cycle would have no end."""
+        branch = [node]
+        while self.parent[tree][branch[-1]] >= 0:
+            branch.append(self.parent[tree][branch[-1]])
+            assert len(branch) <= len(self.parent[tree])
+        return naive.path_length(self.q[tree][branch[::-1]])
+
+    def edge(self, event: np.void) -> None:
+        """A node joins below one that is no farther than a step, by a free motion."""
+        tree, node, parent = (int(event[name]) for name in ("tree", "node", "parent"))
+        assert node == len(self.parent[tree])
+        assert parent in self.parent[tree] or (parent, node) == (-1, 0)
+        self.parent[tree][node] = parent
+        np.testing.assert_allclose(event["cost"], self.cost(tree, node), rtol=ROUNDING)
+        assert ((self.world.lower <= event["q"]) & (event["q"] <= self.world.upper)).all()
+        if parent >= 0:
+            self.check_motion(tree, parent, node)
+
+    def rewire(self, event: np.void) -> None:
+        """A node near the newest one gets it as its parent, and a lower cost."""
+        tree, node, parent = (int(event[name]) for name in ("tree", "node", "parent"))
+        assert parent == len(self.parent[tree]) - 1
+        before = self.cost(tree, node)
+        self.parent[tree][node] = parent
+        assert event["cost"] < before * (1 + ROUNDING)
+        np.testing.assert_allclose(event["cost"], self.cost(tree, node), rtol=ROUNDING)
+        length = self.check_motion(tree, parent, node)
+        near = self.promise.near
+        assert near is not None
+        assert length <= near.radius(np.array([parent + 1]))[0] * (1 + ROUNDING)
+
+    def check_motion(self, tree: int, parent: int, node: int) -> float:
+        """An edge is free, no longer than a step, and not of no length."""
+        a, b = self.q[tree][parent], self.q[tree][node]
+        length = naive.path_length(np.array([a, b]))
+        assert self.promise.step is not None
+        assert 0 < length <= self.promise.step + ROUNDING * np.abs([a, b]).max()
+        assert not naive.hits(self.world, a, b)
+        return length
+
+    def connect(self, event: np.void) -> None:
+        """A link joins the newest nodes, is free, and no longer than promised."""
+        node, other = int(event["node"]), int(event["other"])
+        assert [node, other] == [len(parent) - 1 for parent in self.parent]
+        a, b = self.q[0][node], self.q[1][other]
+        length = naive.path_length(np.array([a, b]))
+        assert self.promise.link is not None
+        assert length <= self.promise.link
+        assert not naive.hits(self.world, a, b)
+        cost = self.cost(0, node) + length + self.cost(1, other)
+        np.testing.assert_allclose(event["cost"], cost, rtol=ROUNDING)
+        self.links.append((node, other))
+
+    def path(self, event: np.void) -> None:
+        """A path is better than the one before, free, and leads along the trees as they stand."""
+        problem, waypoints = self.run.problem, event["waypoints"]
+        assert event["stage"] == (Stage.RAW if self.best == np.inf else Stage.IMPROVED)
+        assert event["cost"] < self.best
+        self.best = float(event["cost"])
+        assert (waypoints[0] == problem.start).all()
+        assert (waypoints[-1] == problem.goal).all()
+        assert naive.path_is_free(self.world, waypoints)
+        length = naive.path_length(waypoints)
+        np.testing.assert_allclose(event["cost"], length, rtol=ROUNDING, atol=0)
+        straight = naive.path_length(np.array([problem.start, problem.goal]))
+        assert self.best >= straight * (1 - ROUNDING)
+
+    def reject(self, event: np.void) -> None:
+        """What was given up was in the way of something, or of no use."""
+        tree = int(event["tree"])
+        q = self.q[tree][event["node"]]
+        if event["reason"] == Reason.NO_PROGRESS:
+            assert (q == event["q"]).all()
+        elif event["reason"] == Reason.NO_GAIN:
+            problem = self.run.problem
+            way = naive.path_length(np.array([problem.start, event["q"], problem.goal]))
+            assert way >= self.best * (1 - ROUNDING)
+        else:
+            assert naive.nearly_hits(self.world, q, event["q"])
+
+
+def check_all(run: Run, events: Events) -> None:
+    """Everything that holds for every run without smoothing."""
+    check_log(events)
+    check_samples(run, events)
+    phases = events[Kind.PHASE]
+    assert (phases["name"] == Phase.PLAN).all()
+    assert phases["seq"].tolist() == [0, len(events) - 1]
+    fold = Fold(run, events)
+    names = (Kind.EDGE, Kind.REWIRE, Kind.CONNECT, Kind.PATH, Kind.REJECT)
+    rows = sorted(
+        (int(event["seq"]), kind, event) for kind in names for event in events[kind]
+    )
+    for _, kind, event in rows:
+        getattr(fold, kind.label)(event)
+    if run.manifest.scenario.make_planner().as_dict()["stop_at_first"]:
+        assert (status(events) is Status.SOLVED) == (len(events[Kind.PATH]) == 1)
+    else:
+        assert status(events) is Status.ITERATION_LIMIT
+    if is_double(run):
+        assert (fold.best < np.inf) == (len(fold.links) > 0)
+    else:
+        assert (fold.best < np.inf) == (fold.q[0] == run.problem.goal).all(axis=1).any()
+
+
+def check_samples(run: Run, events: Events) -> None:
+    """One sample an iteration, in bounds; where informed, only where a better path may lead."""
+    problem, samples, paths = run.problem, events[Kind.SAMPLE], events[Kind.PATH]
+    informed = run.manifest.scenario.make_planner().as_dict()["informed"]
+    q, source = samples["q"], samples["source"]
+    assert (samples["iteration"] == 1 + np.arange(len(samples))).all()
+    assert (samples["tree"] == np.arange(len(samples)) % (1 + is_double(run))).all()
+    assert ((problem.world.lower <= q) & (q <= problem.world.upper)).all()
+    assert (q[source == Source.GOAL] == problem.goal).all()
+    if len(paths) and informed:
+        assert ((source == Source.INFORMED) == (samples["seq"] > paths["seq"][0])).all()
+    else:
+        assert np.isin(source, [Source.UNIFORM, Source.GOAL]).all()
+    if is_double(run):
+        assert not (source == Source.GOAL).any()
+    drawn = samples[source == Source.INFORMED]
+    best = paths["cost"][np.searchsorted(paths["seq"], drawn["seq"]) - 1] if len(drawn) else 0.0
+    way = distances(problem.start[None], drawn["q"]) + distances(drawn["q"], problem.goal[None])
+    assert (way <= best * (1 + 1e-9)).all()
+
+
+TWINS = {"rrt-star": twins.RRTStar, "bi-rrt-star": twins.BiRRTStar}
+
+
+def twin_of(run: Run) -> list[twins.Event]:
+    """What the slow twin says in the same run."""
+    scenario, near = run.manifest.scenario, promise(run).near
+    assert near is not None
+    settings = scenario.make_planner().as_dict()
+    twin = TWINS[scenario.planner](run.problem, scenario.seed, settings, near)
+    return twin.run(run.stop.iterations)
+
+
+@st.composite
+def scenarios(draw: st.DrawFn) -> Scenario:
+    """Small runs with any options in random worlds."""
+    worlds = st.sampled_from(["circles2d", "squares2d", "boxes2d", "boxes3d", "spheres3d"])
+    planner = draw(st.sampled_from(sorted(TWINS)))
+    params: dict[str, Any] = {"informed": draw(st.booleans())}
+    params["stop_at_first"] = draw(st.sampled_from([False, False, True]))
+    params["step"] = draw(st.sampled_from([None, 3.0, 20.0, 40.0, 1000.0]))
+    params["gamma"] = draw(st.sampled_from([None, None, 1e-3, 30.0, 1e6]))
+    if planner == "rrt-star":
+        params["goal_bias"] = draw(st.sampled_from([0.0, 0.05, 0.5, 1.0]))
+    else:
+        params["connect_distance"] = draw(st.sampled_from([None, None, 0.5, 10.0, 200.0]))
+    n, seed = draw(st.sampled_from([0, 5, 30])), draw(st.integers(0, 999))
+    return plain(
+        f"{draw(worlds)}:n={n},seed={seed}",
+        planner=planner,
+        params=params,
+        seed=draw(st.integers(0, 2**64)),
+        iterations=draw(st.integers(1, 80)),
+    )
+
+
+@FEW
+@given(scenarios())
+def test_contract_and_twin(scenario: Scenario) -> None:
+    """Everything that is promised, and event by event what the slow twin says."""
+    run, events = planned(scenario)
+    check_all(run, events)
+    assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
