@@ -73,15 +73,16 @@ class Run:
     def events(self) -> Iterator[Events]:
         """Plan, smooth, drive; yield what happens, in batches."""
         rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
-        path, moved = None, False
+        path, moved, iteration = None, False, 0
         for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
             path = _last_path(batch, path)
             moved = moved or Kind.MOVE in batch.counts
+            # A planner may have gone on after its path, and iterations never fall.
+            iteration = max(iteration, batch.last.iteration)
             yield batch
         if path is None:
             return
-        waypoints, iteration = path["waypoints"], int(path["iteration"])
-        space = self.problem.space
+        waypoints, space = path["waypoints"], self.problem.space
         if self._smoother is not None and not self.stop.interrupted:
             for batch in self._smoother.smooth(
                 waypoints, space, rng, self._log, self.stop, iteration
