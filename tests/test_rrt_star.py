@@ -1,21 +1,40 @@
 """What RRT* promises, with one tree and with two, proven from its events alone."""
 
+import importlib.util
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
+from brrt.kernels.jit import config
 from brrt.planners import Contract
 from brrt.run import Run
 from brrt.scenario import Scenario
 
 from . import naive, twins
-from .test_rrt import FEW, ROUNDING, check_log, plain, planned, status
+from .test_rrt import FEW, ROUNDING, bounds_of_binomial, check_log, plain, planned, status
 
 Floats = NDArray[np.float64]
+
+
+def benchmark(name: str) -> Any:
+    """Load a script of `benchmarks/`."""
+    path = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+optimality = benchmark("optimality")
 
 
 def promise(run: Run) -> Contract:
@@ -214,3 +233,95 @@ def test_contract_and_twin(scenario: Scenario) -> None:
     run, events = planned(scenario)
     check_all(run, events)
     assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
+
+
+@pytest.mark.parametrize("planner", sorted(TWINS))
+@pytest.mark.parametrize("informed", [False, True])
+@pytest.mark.parametrize(
+    ("world", "step"), [("circles2d:n=25,seed=3", 10.0), ("spheres3d:n=60,seed=1", 20.0)]
+)
+def test_twin_in_a_longer_run(planner: str, informed: bool, world: str, step: float) -> None:
+    """Hundreds of iterations in which everything happens that can, as the slow twin has it."""
+    scenario = plain(
+        world, planner=planner, params={"informed": informed, "step": step}, iterations=400, seed=2
+    )
+    run, events = planned(scenario)
+    assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
+    assert {Reason.COLLISION, Reason.NEAR_BLOCKED} <= set(events[Kind.REJECT]["reason"].tolist())
+    assert (events[Kind.PATH]["stage"] == Stage.IMPROVED).sum() > 3
+    assert len(events[Kind.REWIRE]) > 100
+    assert (Source.INFORMED in events[Kind.SAMPLE]["source"]) == informed
+    assert len(events[Kind.CONNECT]) > 8 or planner == "rrt-star"
+
+
+@pytest.mark.parametrize("planner", sorted(TWINS))
+@pytest.mark.parametrize("apart", [0.0, 4.0])
+def test_twin_where_nothing_can_be_gained(planner: str, apart: float) -> None:
+    """Once the path is straight, informed sampling adds no node that could not better it."""
+    scenario = plain(
+        "circles2d:n=0", planner=planner, params={"informed": True}, iterations=60,
+        start=(20.0, 20.0), goal=(20.0, 20.0 + apart),
+    )  # fmt: skip
+    run, events = planned(scenario)
+    check_all(run, events)
+    assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
+    futile = np.isin(events[Kind.REJECT]["reason"], [Reason.NO_GAIN, Reason.NO_PROGRESS])
+    assert futile.sum() > 10
+    assert not (events[Kind.PATH]["stage"] == Stage.IMPROVED).any()
+
+
+def test_goal_within_reach_is_the_next_sample() -> None:
+    """A node a step from the goal makes the goal the next sample, without any bias."""
+    scenario = plain(
+        "circles2d:n=0,size=30", planner="rrt-star", params={"goal_bias": 0.0, "step": 3.0},
+        iterations=500, start=(5.0, 5.0), goal=(20.0, 20.0),
+    )  # fmt: skip
+    run, events = planned(scenario)
+    check_all(run, events)
+    goals = events[Kind.SAMPLE][events[Kind.SAMPLE]["source"] == Source.GOAL]
+    assert len(goals) == 1
+    edges = events[Kind.EDGE]
+    (at_goal,) = edges[(edges["q"] == run.problem.goal).all(axis=1)]
+    assert at_goal["iteration"] == goals["iteration"][0]
+    assert (distances(edges["q"][: at_goal["node"] - 1], run.problem.goal[None]) > 3).all()
+
+
+@pytest.mark.parametrize("bias", [0.05, 0.5])
+def test_goal_bias(bias: float) -> None:
+    """Without a path the goal is drawn as often as asked for (false alarm 1e-9)."""
+    n = 3000
+    scenario = plain(
+        "circles2d:n=0", planner="rrt-star", params={"goal_bias": bias, "step": 1e-3}, iterations=n
+    )
+    _, events = planned(scenario)
+    low, high = bounds_of_binomial(n, bias)
+    assert low <= (events[Kind.SAMPLE]["source"] == Source.GOAL).sum() <= high
+
+
+ASYMPTOTIC = [(2, 5.0, 6000, 2000), (3, 20.0, 6000, 2000)]
+"""Dimension, step, and iterations after which a path is within 2 %, and before."""
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="takes minutes without the compiler")
+@pytest.mark.parametrize(("dim", "step", "most", "few"), ASYMPTOTIC)
+@pytest.mark.parametrize("name", ["empty", "box", "ball"])
+def test_paths_come_close_to_the_optimum(
+    dim: int, step: float, most: int, few: int, name: str, tmp_path: Path
+) -> None:
+    """Over 20 seeds the median falls to within 2 % of the optimum; informed is ahead of plain."""
+    (case,) = (case for case in optimality.cases() if case.name == f"{dim}D {name}")
+    world, medians = case.save(tmp_path), {}
+    for title, (planner, params) in optimality.PLANNERS.items():
+        runs = np.array(
+            [
+                optimality.costs(world, planner, {**params, "step": step}, seed, (few, most))
+                for seed in range(20)
+            ]
+        )
+        assert (runs >= case.optimum * (1 - ROUNDING)).all()
+        medians[title] = np.median(runs, axis=0) / case.optimum
+        early, late = medians[title]
+        assert late < 1.02
+        assert late < early or late < 1 + 1e-6
+    for planner in TWINS:
+        assert (medians[f"{planner}, informed"] < medians[planner]).all()
