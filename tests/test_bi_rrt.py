@@ -1,6 +1,7 @@
 """What RRT-Connect and bidirectional RRT promise, proven from their events alone."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
 from brrt.planners.bi_rrt import BiRRT
 from brrt.run import Run
 from brrt.scenario import Scenario
+from brrt.worlds import World
 
 from . import naive, twins
 from .test_rrt import (
@@ -31,6 +33,16 @@ VARIANTS: dict[str, Any] = {
     "turn": ["alternate", "smaller", "coin"],
     "always_link": [False, True],
 }
+
+
+@pytest.fixture(scope="module")
+def walled(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A world file whose start and goal are kept apart by a wall."""
+    path = tmp_path_factory.mktemp("worlds") / "walled.json"
+    ends = {"start": np.array([1.0, 1.0]), "goal": np.array([9.0, 9.0])}
+    wall = np.array([[4.0, -1.0, 6.0, 11.0]])
+    World("walled", np.zeros(2), np.full(2, 10.0), boxes=wall, **ends).save(path)
+    return str(path)
 
 
 def settings_of(run: Run) -> dict[str, Any]:
@@ -174,3 +186,92 @@ def test_contract_and_twin(scenario: Scenario) -> None:
     run, events = planned(scenario)
     check_all(run, events)
     assert twins.told(events) == twin_of(run, events)
+
+
+@pytest.mark.parametrize("grow", VARIANTS["grow"])
+@pytest.mark.parametrize("link", VARIANTS["link"])
+@pytest.mark.parametrize("turn", VARIANTS["turn"])
+@pytest.mark.parametrize("world", ["circles2d:n=50,seed=3", "boxes3d:n=200,seed=3"])
+def test_twin_in_a_longer_run(grow: str, link: str, turn: str, world: str) -> None:
+    """Hundreds of iterations in a crowded world, as the slow twin has it."""
+    params = {"grow": grow, "link": link, "turn": turn, "always_link": link == "extend"}
+    scenario = plain(world, planner="bi-rrt", params={"step": 2.0, **params}, iterations=200)
+    run, events = planned(scenario)
+    check_all(run, events)
+    assert twins.told(events) == twin_of(run, events)
+    assert len(events[Kind.EDGE]) > 30
+    assert len(events[Kind.PATH]) or len(events[Kind.SAMPLE]) == 200
+
+
+def test_rrt_connect_is_a_variant() -> None:
+    """The planner of that name is the greedy one of the variants."""
+    scenario = plain("squares2d:n=40,seed=3", planner="rrt-connect", params={"step": 4.0}, seed=1)
+    variant = {"grow": "extend", "link": "connect", "turn": "alternate", "step": 4.0}
+    _, events = planned(scenario)
+    assert len(events[Kind.PATH])
+    naive.assert_same(events, planned(replace(scenario, planner="bi-rrt", params=variant))[1])
+
+
+@pytest.mark.parametrize("link", VARIANTS["link"])
+def test_a_coin_decides_who_grows(walled: str, link: str) -> None:
+    """About half of the draws head for the other tree (false alarm 1e-9); the others swap roles."""
+    n = 4000
+    scenario = plain(
+        walled, planner="bi-rrt", params={"turn": "coin", "link": link}, iterations=n
+    )
+    _, events = planned(scenario)
+    low, high = bounds_of_binomial(n, 0.5)
+    assert low <= (events[Kind.SAMPLE]["source"] == Source.OTHER_TREE).sum() <= high
+
+
+def test_the_smaller_tree_grows(tmp_path: Path) -> None:
+    """A tree that is held up in a pocket is always the one to try, until it is the larger."""
+    pocket = np.array([[1, 1, 3, 1.2], [1, 2.8, 3, 3], [1, 1, 1.2, 3], [2.8, 1.9, 3, 3.0]])
+    path = tmp_path / "pocket.json"
+    ends = {"start": np.array([2.0, 2.0]), "goal": np.array([8.0, 8.0])}
+    World("pocket", np.zeros(2), np.full(2, 10.0), boxes=pocket, **ends).save(path)
+    shares = {}
+    for turn in ("alternate", "smaller"):
+        scenario = plain(
+            str(path), planner="bi-rrt", params={"turn": turn, "step": 0.1}, iterations=300
+        )
+        run, events = planned(scenario)
+        check_turns(run, events)
+        shares[turn] = (events[Kind.SAMPLE]["tree"] == 0).mean()
+    assert shares["alternate"] == 0.5
+    assert shares["smaller"] > 0.6
+
+
+@pytest.mark.parametrize("always_link", [False, True])
+def test_always_link(walled: str, always_link: bool) -> None:
+    """Where nothing could be added, the other tree moves only if it always does."""
+    params = {"always_link": always_link, "step": 3.0}
+    _, events = planned(plain(walled, planner="bi-rrt", params=params, iterations=300))
+    edges, rejects, idle = events[Kind.EDGE], events[Kind.REJECT], 0
+    for sample in events[Kind.SAMPLE]:
+        grown = edges[edges["iteration"] == sample["iteration"]]
+        refused = rejects[rejects["iteration"] == sample["iteration"]]
+        if sample["tree"] in grown["tree"]:
+            continue
+        idle += 1
+        others = np.concatenate([grown["tree"], refused["tree"]]) == 1 - sample["tree"]
+        assert others.any() == always_link
+    assert idle > 30
+
+
+@pytest.mark.parametrize("world", ["circles2d:n=50", "boxes2d:n=30", "spheres3d:n=40"])
+def test_two_trees_need_far_fewer_iterations(world: str) -> None:
+    """The median over seeds is less than half of what one tree needs; paths are smoothed."""
+    medians = {}
+    for planner in ("rrt", "bi-rrt", "rrt-connect"):
+        counts = []
+        for seed in range(21):
+            scenario = plain(f"{world},seed={seed}", planner=planner, seed=seed, smooth=True)
+            _, events = planned(replace(scenario, iterations=100_000))
+            raw, smoothed = events[Kind.PATH]
+            assert smoothed["cost"] <= raw["cost"]
+            assert len(smoothed["waypoints"]) <= len(raw["waypoints"])
+            counts.append(len(events[Kind.SAMPLE]))
+        medians[planner] = np.median(counts)
+    assert medians["bi-rrt"] < medians["rrt"] / 2
+    assert medians["rrt-connect"] < medians["rrt"] / 2
