@@ -33,7 +33,8 @@ def main() -> None:
         unit = 0.0
         for planner in PLANNERS:
             runs = [
-                Run(Scenario(world=world.format(seed), planner=planner, seed=seed)) for seed in seeds
+                Run(Scenario(world=world.format(seed), planner=planner, seed=seed))
+                for seed in seeds
             ]
             solved = [f for f in (run.execute().as_dict() for run in runs) if f["solved"]]
             raw = median(f["path_cost"] for f in solved)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -121,7 +121,9 @@ def check_turns(run: Run, events: Events) -> None:
     """Each iteration has one sample, drawn for the tree whose turn it is."""
     turn, samples = settings_of(run)["turn"], events[Kind.SAMPLE]
     assert (samples["iteration"] == 1 + np.arange(len(samples))).all()
-    assert ((run.problem.world.lower <= samples["q"]) & (samples["q"] <= run.problem.world.upper)).all()
+    assert (
+        (run.problem.world.lower <= samples["q"]) & (samples["q"] <= run.problem.world.upper)
+    ).all()
     linking = samples["source"] == Source.OTHER_TREE
     if turn == "alternate":
         assert (samples["tree"] == np.arange(len(samples)) % 2).all()
@@ -157,7 +159,9 @@ def check_all(run: Run, events: Events) -> None:
 def twin_of(run: Run, events: Events) -> list[twins.Event]:
     """What the slow twin says in the same run."""
     twin = twins.BiRRT(run.problem, run.manifest.scenario.seed, settings_of(run))
-    return twin.run(len(events[Kind.SAMPLE]) if status(events) is Status.SOLVED else run.stop.iterations)
+    return twin.run(
+        len(events[Kind.SAMPLE]) if status(events) is Status.SOLVED else run.stop.iterations
+    )
 
 
 @st.composite
@@ -216,9 +220,7 @@ def test_rrt_connect_is_a_variant() -> None:
 def test_a_coin_decides_who_grows(walled: str, link: str) -> None:
     """About half of the draws head for the other tree (false alarm 1e-9); the others swap roles."""
     n = 4000
-    scenario = plain(
-        walled, planner="bi-rrt", params={"turn": "coin", "link": link}, iterations=n
-    )
+    scenario = plain(walled, planner="bi-rrt", params={"turn": "coin", "link": link}, iterations=n)
     _, events = planned(scenario)
     low, high = bounds_of_binomial(n, 0.5)
     assert low <= (events[Kind.SAMPLE]["source"] == Source.OTHER_TREE).sum() <= high

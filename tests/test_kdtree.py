@@ -300,7 +300,9 @@ def test_near_is_near_in_each_tree(dim: int, kind, trees: int, n: int) -> None: 
     trees = min(trees, len(points))
     roots = rng.integers(0, trees, len(points))
     roots[:trees] = np.arange(trees)
-    queries = np.concatenate([points[rng.integers(0, len(points), 6)], rng.uniform(-1, 2, (6, dim))])
+    queries = np.concatenate(
+        [points[rng.integers(0, len(points), 6)], rng.uniform(-1, 2, (6, dim))]
+    )
     exact = np.sqrt(naive.squared_distances(points, queries[0]))[rng.integers(0, len(points), 2)]
     radii = np.array([0.0, 1e-12, 0.01, 0.2, 1.0, 1e200, np.inf, *exact])
     check_near(planted_each(points, roots), points, roots, queries, radii)
@@ -308,7 +310,7 @@ def test_near_is_near_in_each_tree(dim: int, kind, trees: int, n: int) -> None: 
 
 @DIMS
 def test_trees_that_share_their_room_grow(dim: int) -> None:
-    """One tree grows far beyond the other, in order, so that its cells are rebuilt again and again."""
+    """One tree grows far beyond the other, in order: its cells are rebuilt again and again."""
     n = 3000
     rng = np.random.default_rng(dim)
     points = rng.random((n, dim)) + np.arange(n)[:, None] / 100
@@ -323,7 +325,7 @@ def test_trees_that_share_their_room_grow(dim: int) -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.data(), st.sampled_from([2, 3]), st.integers(2, 60))
 def test_near_any_points(data: st.DataObject, dim: int, n: int) -> None:
-    """Equal and all but equal points: those within the radius, but for what 16 others answer for."""
+    """Equal and all but equal points: all within the radius, or 16 equal ones in their place."""
     numbers = data.draw(st.lists(coordinate, min_size=dim, max_size=24))
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     points = rng.choice(numbers, (n, dim))

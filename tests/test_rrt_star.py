@@ -49,7 +49,7 @@ def is_double(run: Run) -> bool:
 
 def distances(a: Floats, b: Floats) -> Floats:
     """Distances between two rows of configurations, pair by pair."""
-    return np.sqrt(((b - a) ** 2).sum(axis=1))
+    return np.asarray(np.sqrt(((b - a) ** 2).sum(axis=1)))
 
 
 class Fold:
@@ -155,9 +155,7 @@ def check_all(run: Run, events: Events) -> None:
     assert phases["seq"].tolist() == [0, len(events) - 1]
     fold = Fold(run, events)
     names = (Kind.EDGE, Kind.REWIRE, Kind.CONNECT, Kind.PATH, Kind.REJECT)
-    rows = sorted(
-        (int(event["seq"]), kind, event) for kind in names for event in events[kind]
-    )
+    rows = sorted((int(event["seq"]), kind, event) for kind in names for event in events[kind])
     for _, kind, event in rows:
         getattr(fold, kind.label)(event)
     if run.manifest.scenario.make_planner().as_dict()["stop_at_first"]:

@@ -8,6 +8,7 @@ exact arithmetic. A log is a list of tuples: kind, iteration, and the kind's fie
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -96,7 +97,7 @@ class Tree:
     def cost(self, node: int) -> float:
         """Length of the branch, summed from the root on."""
         points, total = self.branch(node)[::-1], 0.0
-        for a, b in zip(points, points[1:], strict=False):
+        for a, b in pairwise(points):
             total += distance(a, b)
         return total
 
