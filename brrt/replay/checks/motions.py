@@ -28,13 +28,14 @@ def first_hits(obstacles: "Obstacles", robot: Any, a: Floats, b: Floats) -> Ints
 
     Args:
         obstacles: What is in the way.
-        robot: What moves; with a method `outline`, shapes in the plane, else a point.
+        robot: What moves: a body with an outline in the plane, or a point, which has none.
         a: Where the motions begin, shape (n, dof).
         b: Where they end, shape (n, dof).
     """
     hit = np.full(len(a), len(obstacles))
     if len(a) and len(obstacles):
-        find = _swept if hasattr(robot, "outline") else _straight
+        has_body = len(a) > 0 and len(robot.outline(a[0])) > 0
+        find = _swept if has_body else _straight
         for i, j in find(obstacles, robot, a, b):
             np.minimum.at(hit, i, j)
     return np.asarray(np.where(hit < len(obstacles), hit, -1))
