@@ -48,8 +48,8 @@ def test_a_seed_fixes_everything(brrt: Command) -> None:
         assert brrt("plan", "--seed", seed, "--out", f"{name}.mcap").code == 0
     equal, parted = (brrt("replay", "a.mcap", "--check", f"{x}.mcap") for x in "bc")
     assert (equal.code, parted.code) == (0, 1)
-    assert "equal to b.mcap" in equal.out
-    assert "event 2 (sample): q (" in parted.out
+    assert "a.mcap (seed 7) and b.mcap (seed 7) are equal" in equal.out
+    assert "a.mcap (seed 7) and c.mcap (seed 8) part at event 2 (sample): q (" in parted.out
     assert brrt("replay", "a.mcap", "--check", "c.mcap", "--json").json["check"]["equal"] is False
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ ROBOTS = {
 def scenario(robot: str, seed: int = 0) -> Scenario:
     """Start and goal at random."""
     return Scenario(
-        world=ROBOTS[robot], robot=robot.split(" in ")[0], planner="rrt-connect", seed=seed,
+        world=ROBOTS[robot], robot=robot.split(" in ", maxsplit=1)[0], planner="rrt-connect", seed=seed,
         start="random", goal="random",
     )  # fmt: skip
 
@@ -58,7 +59,7 @@ def test_each_has_a_stream_of_its_own() -> None:
     other = replace(scenario("point"), start=start)
     logs = []
     for each in (scenario("point"), one, other, replace(one, start=start)):
-        problem, memory = each.make_problem(both.world), Memory()
+        problem = each.make_problem(both.world)
         assert (problem.start == both.start).all()
         assert (problem.goal == both.goal).all()
     plain = Scenario(world=ROBOTS["point"], planner="rrt-connect")
@@ -80,8 +81,7 @@ def test_a_recording_holds_what_was_drawn(brrt: Callable[..., Result]) -> None:
     assert done.code == 0, done.err
     assert brrt("replay", "a.mcap", "--json").json == done.json
     assert brrt("verify", "a.mcap").code == 0
-    with open("s.toml", "w", encoding="utf-8") as file:
-        file.write('start = "random"\ngoal = "random"\nseed = 5\n')
+    Path("s.toml").write_text('start = "random"\ngoal = "random"\nseed = 5\n')
     again = brrt("plan", "s.toml", "--out", "b.mcap", "--json")
     assert again.json["path"] == done.json["path"]
     assert brrt("replay", "a.mcap", "--check", "b.mcap").code == 0
