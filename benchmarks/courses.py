@@ -61,7 +61,9 @@ def main() -> None:
     parser.add_argument("maps", type=Path, help="folder with the maps and queries.json")
     parser.add_argument("--runs", type=int, default=5)
     options = parser.parse_args()
-    print("| map | planner | s | moves | length | charged | published: s / moves / length | times |")
+    print(
+        "| map | planner | s | moves | length | charged | published: s / moves / length | times |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, published in PUBLISHED.items():
         for planner, (seconds, moves, length) in zip(PLANNERS, published, strict=True):

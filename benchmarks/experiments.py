@@ -43,34 +43,32 @@ class Row:
     @property
     def iterations(self) -> float:
         """Median iterations, of failures too."""
-        return median(each["iterations"] for each in self.figures)
+        return float(median(each["iterations"] for each in self.figures))
 
     @property
     def extensions(self) -> float:
         """Median extensions, of failures too: each becomes a node or is rejected."""
-        return median(each["nodes"] + each["rejects"] for each in self.figures)
+        return float(median(each["nodes"] + each["rejects"] for each in self.figures))
 
     @property
     def ms(self) -> float:
         """Median time to plan, of failures too."""
-        return 1e3 * median(each["plan_time_s"] for each in self.figures)
+        return 1e3 * float(median(each["plan_time_s"] for each in self.figures))
 
     def cost(self, stage: str) -> float:
         """Median cost of the paths; `stage` is `path` or `smoothed`."""
-        return median(each[f"{stage}_cost"] for each in self.solved)
+        return float(median(each[f"{stage}_cost"] for each in self.solved))
 
     def motions(self, stage: str) -> float:
         """Median number of motions of the paths."""
         key = "path" if stage == "path" else "smoothed_path"
-        return median(len(each[key]) - 1 for each in self.solved)
+        return float(median(len(each[key]) - 1 for each in self.solved))
 
 
 def measure(name: str, planner: str, params: Mapping[str, Any], seeds: int) -> Row:
     """Run one planner on the world and the query of a scenario file."""
     base = Scenario.load(EXAMPLES / f"{name}.toml")
-    scenarios = (
-        replace(base, planner=planner, params=params, seed=seed) for seed in range(seeds)
-    )
+    scenarios = (replace(base, planner=planner, params=params, seed=seed) for seed in range(seeds))
     return Row(name, label(planner, params), [Run(s).execute().as_dict() for s in scenarios])
 
 

@@ -94,8 +94,8 @@ def replay(
         if golden is not None:
             seeds = [each.manifest.scenario.seed for each in (recording, golden)]
             against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"
-            verdict = f"part at {difference}" if difference else "are equal, event by event"
-            out.print(f"{against} {verdict}", markup=False, soft_wrap=True)
+            outcome = f"part at {difference}" if difference else "are equal, event by event"
+            out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
     if difference:
         raise typer.Exit(Code.FAILED)
 

@@ -76,17 +76,17 @@ def _figures(name: str, planner: str) -> list[dict[str, Any]]:
 
 def extensions(figures: list[dict[str, Any]]) -> float:
     """Median of the extensions tried: each became a node or was rejected."""
-    return median(each["nodes"] + each["rejects"] for each in figures)
+    return float(median(each["nodes"] + each["rejects"] for each in figures))
 
 
 def motions(figures: list[dict[str, Any]], path: str) -> float:
     """Median of the motions of the paths that were found."""
-    return median(len(each[path]) - 1 for each in figures if each["solved"])
+    return float(median(len(each[path]) - 1 for each in figures if each["solved"]))
 
 
 def cost(figures: list[dict[str, Any]], path: str) -> float:
     """Median of the costs of the paths that were found."""
-    return median(each[path] for each in figures if each["solved"])
+    return float(median(each[path] for each in figures if each["solved"]))
 
 
 @pytest.mark.parametrize(("name", "times"), [("house-easy", 2.0), ("arm-easy", 1.1)])

@@ -23,7 +23,7 @@ ROBOTS = {
 def scenario(robot: str, seed: int = 0) -> Scenario:
     """Start and goal at random."""
     return Scenario(
-        world=ROBOTS[robot], robot=robot.split(" in ", maxsplit=1)[0], planner="rrt-connect", seed=seed,
+        world=ROBOTS[robot], robot=robot.partition(" in ")[0], planner="rrt-connect", seed=seed,
         start="random", goal="random",
     )  # fmt: skip
 
