@@ -89,7 +89,7 @@ def cost(figures: list[dict[str, Any]], path: str) -> float:
     return float(median(each[path] for each in figures if each["solved"]))
 
 
-@pytest.mark.parametrize(("name", "times"), [("house-easy", 2.0), ("arm-easy", 1.1)])
+@pytest.mark.parametrize(("name", "times"), [("house-easy", 2.0), ("arm-easy", 4.0)])
 def test_two_trees_need_a_fraction_of_the_work(name: str, times: float) -> None:
     """Both planners always solve the easy worlds; one needs several times the iterations.
 
@@ -97,7 +97,7 @@ def test_two_trees_need_a_fraction_of_the_work(name: str, times: float) -> None:
     """
     one, two = _figures(name, "rrt"), _figures(f"{name}-bi", "bi-rrt")
     assert all(each["solved"] for each in one + two)
-    assert median(f["iterations"] for f in one) > 2.5 * median(f["iterations"] for f in two)
+    assert median(f["iterations"] for f in one) > 5 * median(f["iterations"] for f in two)
     assert extensions(one) > times * extensions(two)
 
 
@@ -124,11 +124,11 @@ def test_smoothing_saves_most_motions(name: str, planner: str) -> None:
 
 @pytest.mark.parametrize(("name", "times"), [("house-hard", 10.0), ("arm-hard", 3.0)])
 def test_the_hard_worlds_are_hard(name: str, times: float) -> None:
-    """Two trees solve them with each seed; one alone needs many times as much, or gives up."""
+    """Two trees solve them with each seed; one alone needs many times as much."""
     one, two = _figures(name, "rrt"), _figures(name, "bi-rrt")
     assert all(each["solved"] for each in two)
     assert extensions(one) > times * extensions(two)
-    assert extensions(one) > 5 * extensions(_figures(name.replace("hard", "easy"), "rrt"))
+    assert extensions(two) > 5 * extensions(_figures(name.replace("hard", "easy-bi"), "bi-rrt"))
 
 
 def test_each_seed_has_its_query() -> None:
