@@ -57,7 +57,7 @@ def cases() -> list[Case]:
         # Two tangents from 40 away, and the arc between where they touch.
         around_ball = 2 * math.sqrt(40**2 - 20**2) + 20 * (math.pi - 2 * math.acos(20 / 40))
         bounds = np.zeros(dim), np.full(dim, 100.0)
-        ends = {"start": start, "goal": goal}
+        ends: dict[str, Any] = {"start": start, "goal": goal}
         found += [
             Case(f"{dim}D empty", World("empty", *bounds, **ends), 80.0),
             Case(f"{dim}D box", World("box", *bounds, boxes=box[None], **ends), around_box),

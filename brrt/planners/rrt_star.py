@@ -108,25 +108,24 @@ def solve(
         far=np.empty(n),
         known=np.empty(n, np.uint8),
         stack=np.empty(n, np.int32),
-        links=np.empty((n if len(roots) > 1 else 0, 2), np.int32),
+        links=np.empty((n if len(roots) > 1 else 0, 4), np.int32),
+        link_far=np.empty(n if len(roots) > 1 else 0),
+        linked=np.empty(n if len(roots) > 1 else 0, np.int32),
         counts=counts,
-        best=np.array([np.inf]),
+        best=np.array([np.inf, np.inf]),
         scratch=np.array([problem.start, problem.start, problem.goal, problem.start]),
     )
     star.child[: len(roots)] = -1
     star.sibling[: len(roots)] = -1
+    star.linked[: len(roots)] = -1
     loop = Loop(_star.advance, star, options, _grown, 8, stop.iterations)
     return drive(loop, problem, rng, log, stop)
 
 
 def _grown(star: _star.Star) -> _star.Star:
     n, forest = int(star.forest.nodes[0]), grown_forest(star.forest)
-    capacity = len(forest.parent)
-    return star._replace(
-        forest=forest,
-        links=grown(star.links, int(star.counts[_star.LINKS]), capacity if len(star.links) else 0),
-        **{
-            name: grown(getattr(star, name), n, capacity)
-            for name in ("edge", "child", "sibling", "near", "far", "known", "stack")
-        },
-    )
+    names = ["edge", "child", "sibling", "near", "far", "known", "stack"]
+    # There are no more links than nodes.
+    names += ["links", "link_far", "linked"] if len(star.links) else []
+    larger = {name: grown(getattr(star, name), n, len(forest.parent)) for name in names}
+    return star._replace(forest=forest, **larger)
