@@ -19,6 +19,10 @@ from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
 
+DEFAULT_STEP = 0.2
+"""Part of the map's longest side: four times RRT's, because the step also bounds how far a node
+looks for parents, and with so few of them a tree improves slowly."""
+
 
 @dataclass(frozen=True, slots=True)
 class RRTStar(Planner):
@@ -32,7 +36,7 @@ class RRTStar(Planner):
     default_iterations: ClassVar[int] = 20_000
 
     step: float | None = param(
-        None, "longest edge; 5 % of the map's longest side by default", above=0
+        None, "longest edge; 20 % of the map's longest side by default", above=0
     )
     goal_bias: float = param(
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
@@ -50,7 +54,7 @@ class RRTStar(Planner):
 
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
-        step = step_length(self.step, problem)
+        step = step_length(self.step, problem, DEFAULT_STEP)
         gamma = self.gamma or proven_gamma(problem)
         return Contract(step=step, near=Near(gamma, step, problem.dof))
 
@@ -59,7 +63,7 @@ class RRTStar(Planner):
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
         options = _star.Options(
-            step=step_length(self.step, problem),
+            step=step_length(self.step, problem, DEFAULT_STEP),
             goal_bias=self.goal_bias,
             gamma=self.gamma or proven_gamma(problem),
             informed=self.informed,
