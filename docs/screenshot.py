@@ -4,8 +4,9 @@
     python docs/screenshot.py --readme
 
 With several iterations the pictures are OUT_0.png, OUT_1.png ... The second line makes the
-README's pictures anew, runs included. It needs a Vulkan driver; Mesa's lavapipe will do (Debian: mesa-vulkan-drivers libvulkan1 libegl1 libgl1-mesa-dri
-libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2).
+README's pictures anew, runs included. It needs a Vulkan driver; Mesa's lavapipe will do (Debian:
+mesa-vulkan-drivers libvulkan1 libegl1 libgl1-mesa-dri libxkbcommon-x11-0 libxcursor1 libxi6
+libxrandr2).
 """
 
 import argparse
