@@ -325,6 +325,7 @@ def path_cost(star: Star, space: Any) -> float:
 def tell(star: Star, space: Any, log: Buffer) -> bool:
     """Say that there is a better path, if there is one; return whether the log had room for it."""
     forest, counts = star.forest, star.counts
+    seen, best = counts[SEEN], counts[BEST]
     cost = path_cost(star, space)
     if cost >= star.best[0]:
         return True
@@ -334,6 +335,8 @@ def tell(star: Star, space: Any, log: Buffer) -> bool:
     stage = IMPROVED if counts[PATHS] > 0 else RAW
     counts[POINTS] = emit_path(forest, log, counts[DRAWS], stage, cost, start, goal)
     if counts[POINTS] > 0:
+        # When it is asked again, it has to look at the same links.
+        counts[SEEN], counts[BEST] = seen, best
         return False
     star.best[0] = cost
     counts[PATHS] += 1
@@ -374,12 +377,14 @@ def advance(
     counts = star.counts
     if counts[STAGE] == _BEGIN:
         emit_roots(star.forest, log)
-        counts[STAGE] = _DRAW
+        if len(star.forest.nodes) > 2:
+            link(star, space, log, options)
+        counts[STAGE] = _TELL
     while True:
         if counts[STAGE] == _TELL:
             if not tell(star, space, log):
                 return BATCH_FULL
-            counts[COUNTED] += 1
+            counts[COUNTED] = counts[DRAWS]
             counts[STAGE] = _DRAW
             if options.stop_at_first and counts[PATHS] > 0:
                 emit_solved(log, counts[DRAWS])
