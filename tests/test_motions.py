@@ -1,8 +1,5 @@
 """The checks' own geometry, against exact fractions and against points along the way."""
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -59,10 +56,8 @@ def test_polygons_are_like_boxes(seed: int) -> None:
     boxes = np.concatenate([low, low + 0.2 + rng.random((5, 2))], axis=1)
     polygons = [box[[[0, 1], [2, 1], [2, 3], [0, 3]]] for box in boxes]
     a, b = rng.random((2, 60, 2)) * 10
-    plain: Any = SimpleNamespace(dim=2, boxes=boxes, balls=np.empty((0, 3)))
-    other: Any = SimpleNamespace(
-        dim=2, boxes=np.empty((0, 4)), balls=np.empty((0, 3)), polygons=polygons
-    )
+    ends = np.zeros(2), np.full(2, 10.0)
+    plain, other = World("", *ends, boxes=boxes), World("", *ends, polygons=tuple(polygons))
     one, two = (first_hits(Obstacles(world), Point(), a, b) for world in (plain, other))
     assert one.tolist() == two.tolist()
 
@@ -77,6 +72,10 @@ class Bar:
         c, s = np.cos(q[2]), np.sin(q[2])
         return [self.shape @ np.array([[c, s], [-s, c]]) + q[:2]]
 
+    def canonical(self, q: Floats) -> Floats:
+        """The same pose, its angle in range."""
+        return np.array([q[0], q[1], (q[2] + np.pi) % (2 * np.pi) - np.pi])
+
     def distance(self, a: Floats, b: Floats) -> Floats:
         """Way of the middle, and of an end around it."""
         step = np.asarray(b) - np.asarray(a)
@@ -90,7 +89,7 @@ def test_a_robot_with_an_outline(seed: int) -> None:
     """Against many places along the way, in the bar's own frame."""
     rng = np.random.default_rng(seed)
     balls = np.concatenate([rng.random((4, 2)) * 10, 0.3 + rng.random((4, 1))], axis=1)
-    world = World("", np.zeros(2), np.full(2, 10.0), balls, np.empty((0, 4)))
+    world = World("", np.full(2, -5.0), np.full(2, 15.0), balls, np.empty((0, 4)))
     a, b = rng.random((2, 20, 3)) * [10, 10, 2 * np.pi]
     found = first_hits(Obstacles(world), Bar(), a, b)
     step = b - a

@@ -101,8 +101,9 @@ def outcome(case: Case, tally: Tally) -> None:
 
 
 def _with_path(case: Case) -> set[Status]:
-    """How planning may end where there is a path: who goes on improving it has a budget."""
-    if case.contract.near is None and case.known:
+    """How planning may end where there is a path: who improves it, or tries again, has a budget."""
+    trials = case.manifest.scenario.settings().get("trials", 1)
+    if case.contract.near is None and case.known and trials == 1:
         return {Status.SOLVED, Status.INTERRUPTED}
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
 
