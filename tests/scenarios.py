@@ -1,5 +1,6 @@
 """Random scenarios over all planners, robots and worlds: for the soak and for the tests."""
 
+import hashlib
 import json
 import shlex
 from pathlib import Path
@@ -81,7 +82,7 @@ def _attempt(rng: np.random.Generator, folder: Path, planner: str, kind: str) ->
         near = robot.interpolate(start, goal, float(rng.choice([1e-9, 0.01, 0.1])))
         goal = near if robot.collision(world, near) is None else goal
     ends = [tuple(q.tolist()) for q in (start, goal)]
-    return Scenario(
+    scenario = Scenario(
         world=world_name, robot=robot_name, planner=planner, start=ends[0], goal=ends[1],
         params=_params(rng, planner), seed=int(rng.integers(0, 2**32)),
         iterations=int(rng.choice([1, 10, 60, 150, 300])), smooth=bool(rng.random() < 0.7),
@@ -89,6 +90,12 @@ def _attempt(rng: np.random.Generator, folder: Path, planner: str, kind: str) ->
         max_move=float(rng.choice([0.3, 1.0, 7.0])),
         clock="real" if rng.random() < 0.3 else "logical",
     )  # fmt: skip
+    try:
+        # Obstacles make way for start and goal, and may come to lie where these were free.
+        scenario.make_problem()
+    except BrrtError:
+        return None
+    return scenario
 
 
 def _world(rng: np.random.Generator, folder: Path, *, deep: bool) -> str:
@@ -156,8 +163,6 @@ def _defined(folder: Path, kind: str, **definition: Any) -> str:
 
 def _saved(folder: Path, what: str, text: str) -> str:
     """Write a file whose name says what is in it, so that the same draws name the same file."""
-    import hashlib
-
     path = folder / f"{what}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.json"
     path.write_text(text)
     return str(path)
