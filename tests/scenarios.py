@@ -185,19 +185,21 @@ def _free(rng: np.random.Generator, robot: Robot, world: World) -> Floats | None
     return None
 
 
-def _params(rng: np.random.Generator, planner: str) -> dict[str, Any]:
+def _params(rng: np.random.Generator, planner: str) -> dict[str, Any]:  # noqa: C901 - a table
     """Draw settings of a planner."""
 
     def pick(*values: Any) -> Any:
         return values[int(rng.integers(len(values)))]
 
     if planner in SEARCHES:
-        params = {"epsilon": pick(0.5, 1.0, 3.7), "max_move": pick(0.0, 1.0, 5.0)}
-        params["diagonals"] = pick(True, False)
+        found = {"epsilon": pick(0.5, 1.0, 3.7), "max_move": pick(0.0, 1.0, 5.0)}
+        found["diagonals"] = pick(True, False)
         if planner == "lrta-star":
-            params |= {"lookahead": pick(1, 1, 4, 30), "trials": pick(1, 1, 3)}
-        return params
-    params = {"step": pick(0.2, 1.0, 1.0, 4.0, 1000.0)} if rng.random() < 0.8 else {}
+            found |= {"lookahead": pick(1, 1, 4, 30), "trials": pick(1, 1, 3)}
+        return found
+    params: dict[str, Any] = (
+        {"step": pick(0.2, 1.0, 1.0, 4.0, 1000.0)} if rng.random() < 0.8 else {}
+    )
     if planner == "rrt":
         params |= {"goal_bias": pick(0.0, 0.05, 0.3), "goal_test": pick("step", "line-of-sight")}
         params["count_failed"] = pick(True, True, False)

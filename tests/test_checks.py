@@ -374,7 +374,8 @@ BODIES = {
         start=(0.0, 0.5, 0.5), goal=(-2.0, -1.0, 1.0), clock="logical", iterations=1000,
     ),
     "endless": Scenario(
-        world="circles2d:n=12,seed=2,max_radius=4", robot="chain:links=3,length=9,width=1,wrap=true",
+        world="circles2d:n=12,seed=2,max_radius=4",
+        robot="chain:links=3,length=9,width=1,wrap=true",
         start=(0.0, 0.5, 0.5), goal=(-2.0, -1.0, 1.0), clock="logical", iterations=1000,
     ),
 }  # fmt: skip

@@ -267,7 +267,9 @@ def _begun(
     low = np.stack([vertices.real.min(axis=1), vertices.imag.min(axis=1)], axis=1) - room
     high = np.stack([vertices.real.max(axis=1), vertices.imag.max(axis=1)], axis=1) + room
     found = list(near(low, high, obstacles)) if len(obstacles) else []
-    wall = np.flatnonzero((low < obstacles.walls[0]).any(axis=1) | (high > obstacles.walls[1]).any(axis=1))
+    wall = np.flatnonzero(
+        (low < obstacles.walls[0]).any(axis=1) | (high > obstacles.walls[1]).any(axis=1)
+    )
     rows = np.concatenate([*(i for i, _ in found), wall]).astype(np.int64)
     other = np.concatenate([*(j for _, j in found), np.full(len(wall), obstacles.bounds)])
     two = body.pairs
@@ -277,14 +279,14 @@ def _begun(
         part=np.concatenate([part[rows], np.tile(two[:, 0], n)]),
         other=np.concatenate([other, np.full(n * len(two), obstacles.itself)]).astype(np.int64),
         mate=np.concatenate([np.zeros(len(rows), np.int64), np.tile(two[:, 1], n)]),
-        move=np.concatenate([moves[motion[rows], part[rows]], moves[:, two].sum(axis=2).reshape(-1)]),
-    )  # fmt: skip
+        move=np.concatenate(
+            [moves[motion[rows], part[rows]], moves[:, two].sum(axis=2).reshape(-1)]
+        ),
+    )
 
 
-def _apart(
-    obstacles: Obstacles, scenery: Shapes, body: Body, Q: Floats, pieces: _Pieces
-) -> Floats:
-    """Lower bounds of how far each piece's two are apart, below 0 where they overlap, shape (n,)."""
+def _apart(obstacles: Obstacles, scenery: Shapes, body: Body, Q: Floats, pieces: _Pieces) -> Floats:
+    """Lower bounds of how far each piece's two are apart, below 0 in overlap, shape (n,)."""
     apart = np.empty(len(pieces))
     vertices, axes = body.placed(Q, pieces.part)
     walls = pieces.other == obstacles.bounds
@@ -315,7 +317,8 @@ def _apart(
 def _along(axes: Complex, vertices: Complex) -> Floats:
     """How far each vertex lies along each axis, shape (n, axes, vertices)."""
     return np.asarray(
-        axes.real[:, :, None] * vertices.real[:, None] + axes.imag[:, :, None] * vertices.imag[:, None]
+        axes.real[:, :, None] * vertices.real[:, None]
+        + axes.imag[:, :, None] * vertices.imag[:, None]
     )
 
 

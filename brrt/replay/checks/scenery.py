@@ -48,7 +48,7 @@ class Obstacles:
 
     @cached_property
     def shapes(self) -> "Shapes":
-        """All obstacles of a world in the plane as convex shapes; balls are points with a radius."""
+        """All obstacles in the plane as convex shapes; balls are points with a radius."""
         from brrt.replay.checks.bodies import shapes_of  # noqa: PLC0415 - stands above this file
 
         hulls = [_corners(box) for box in self.boxes] + list(self.balls[:, None, :2])
