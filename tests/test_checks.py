@@ -137,14 +137,18 @@ def test_toys_have_no_findings(name: str, seed: int) -> None:
 def test_contracts_hold(
     seed: int, planner: str, body: str, solid: bool, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """Whatever world, robot, seed and settings: no finding."""
+    """Whatever world, robot, seed and settings: no finding, nor where the log is cut."""
     point = ("point 2D", "point 3D")[seed % 2]
     robot = body if solid and planner in scenarios.TREES else point
     scenario = scenarios.draw(seed, tmp_path_factory.getbasetemp(), planner, robot)
     memory, run = Memory(), Run(scenario)
     run.execute([memory])
-    found = check(run.manifest, run.problem.world, memory.events())
+    log = memory.events()
+    found = check(run.manifest, run.problem.world, log)
     assert found == [], scenarios.command(scenario)
+    part = log.until(seq=seed % len(log))
+    for tally in examine(run.manifest, run.problem.world, part, cut=True):
+        assert not tally.broken, (tally.findings, scenarios.command(scenario))
 
 
 def leaf(case: Evidence) -> int:
