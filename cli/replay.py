@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, note, out, print_json, print_rows, print_summary
+from .console import Code, out, print_json, print_rows, print_summary
+from .saved import Saved
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from brrt.events import Events
     from brrt.recording import Recording
+
+_VERB = "replay them"
 
 
 def replay(
@@ -124,7 +125,7 @@ def _feed(
     recording: "Recording", sinks: list[Any], limits: dict[str, int], *, partial: bool
 ) -> None:
     """Hand the events up to the limits to the sinks."""
-    for batch in _whole(recording, partial=partial):
+    for batch in Saved(recording, partial=partial, verb=_VERB):
         part = batch.until(**limits) if limits else batch
         for sink in sinks:
             sink.write(part)
@@ -132,30 +133,13 @@ def _feed(
             break
 
 
-def _whole(recording: "Recording", *, partial: bool) -> "Iterator[Events]":
-    """Yield the batches; where the file is cut, say what was saved."""
-    from brrt.errors import RecordingError  # noqa: PLC0415
-    from brrt.recording import CutError  # noqa: PLC0415
-
-    events, last = 0, 0
-    try:
-        for batch in recording.batches():
-            events += len(batch)
-            last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
-            yield batch
-    except CutError as error:
-        saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
-        if not partial:
-            raise RecordingError(f"{error}; {saved}: replay them with --partial") from None
-        note(f"{error}; {saved}")
-
-
 def _difference(recording: "Recording", golden: Path, *, partial: bool) -> str | None:
     from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.diff import first_difference  # noqa: PLC0415
 
     found = first_difference(
-        _whole(recording, partial=partial), _whole(read(golden), partial=False)
+        Saved(recording, partial=partial, verb=_VERB),
+        Saved(read(golden), partial=False, verb=_VERB),
     )
     return None if found is None else str(found)
 
