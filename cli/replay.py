@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import Code, note, out, print_json, print_rows, print_summary
+from .saved import Saved
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from brrt.events import Events, Instant
     from brrt.recording import Recording
+
+_VERB = "replay them"
 
 
 def replay(
@@ -137,7 +138,7 @@ def _feed(
     from brrt.events import Instant  # noqa: PLC0415
 
     count, last = 0, Instant(0, 0)
-    for batch in _whole(recording, partial=partial):
+    for batch in Saved(recording, partial=partial, verb=_VERB):
         part = batch.until(**limits) if limits else batch
         for sink in sinks:
             sink.write(part)
@@ -160,28 +161,12 @@ def _note_if_beyond(limits: dict[str, int], count: int, last: "Instant") -> None
             note(f"the recording ends {texts[name]}; this is how it stood then")
 
 
-def _whole(recording: "Recording", *, partial: bool) -> "Iterator[Events]":
-    """Yield the batches; where the file is cut, say what was saved."""
-    from brrt.errors import RecordingError  # noqa: PLC0415
-    from brrt.recording import CutError  # noqa: PLC0415
-
-    events, last = 0, 0
-    try:
-        for batch in recording.batches():
-            events += len(batch)
-            last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
-            yield batch
-    except CutError as error:
-        saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
-        if not partial:
-            raise RecordingError(f"{error}; {saved}: replay them with --partial") from None
-        note(f"{error}; {saved}")
-
-
 def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:
     from brrt.replay.diff import first_difference  # noqa: PLC0415
 
-    found = first_difference(_whole(recording, partial=partial), _whole(golden, partial=False))
+    found = first_difference(
+        Saved(recording, partial=partial, verb=_VERB), Saved(golden, partial=False, verb=_VERB)
+    )
     return None if found is None else str(found)
 
 

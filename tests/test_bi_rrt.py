@@ -39,7 +39,7 @@ VARIANTS: dict[str, Any] = {
 def walled(tmp_path_factory: pytest.TempPathFactory) -> str:
     """A world file whose start and goal are kept apart by a wall."""
     path = tmp_path_factory.mktemp("worlds") / "walled.json"
-    ends = {"start": np.array([1.0, 1.0]), "goal": np.array([9.0, 9.0])}
+    ends: dict[str, Any] = {"start": np.array([1.0, 1.0]), "goal": np.array([9.0, 9.0])}
     wall = np.array([[4.0, -1.0, 6.0, 11.0]])
     World("walled", np.zeros(2), np.full(2, 10.0), boxes=wall, **ends).save(path)
     return str(path)
@@ -230,7 +230,7 @@ def test_the_smaller_tree_grows(tmp_path: Path) -> None:
     """A tree that is held up in a pocket is always the one to try, until it is the larger."""
     pocket = np.array([[1, 1, 3, 1.2], [1, 2.8, 3, 3], [1, 1, 1.2, 3], [2.8, 1.9, 3, 3.0]])
     path = tmp_path / "pocket.json"
-    ends = {"start": np.array([2.0, 2.0]), "goal": np.array([8.0, 8.0])}
+    ends: dict[str, Any] = {"start": np.array([2.0, 2.0]), "goal": np.array([8.0, 8.0])}
     World("pocket", np.zeros(2), np.full(2, 10.0), boxes=pocket, **ends).save(path)
     shares = {}
     for turn in ("alternate", "smaller"):

@@ -20,7 +20,7 @@ from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, RecordingError, Run, Scenario, read
 from brrt.events import FIELDS, Stage, table_dtype
-from brrt.recording import Memory, drawing, rerun, scene, tree_sketch
+from brrt.recording import Memory, canvas, fading, rerun, scene, sketch, trees
 from brrt.recording.rerun import RerunSink, read_rerun, recording_id
 from brrt.recording.stamp import BLANK
 
@@ -222,11 +222,11 @@ def test_log_tells_what_matters(tmp_path: Path) -> None:
 
 def test_long_runs_are_thinned_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond the limits less is drawn, the log says so, and the events stay exact."""
-    monkeypatch.setattr(drawing, "DRAWN_IN_FULL", 100)
-    monkeypatch.setattr(tree_sketch, "DRAWN_IN_FULL", 100)
-    monkeypatch.setattr(tree_sketch, "_CELLS", 64)
-    monkeypatch.setattr(tree_sketch, "_KEPT_NODES", 120)
-    monkeypatch.setattr(drawing, "_FADING_IN_FULL", 50)
+    monkeypatch.setattr(trees, "DRAWN_IN_FULL", 100)
+    monkeypatch.setattr(sketch, "DRAWN_IN_FULL", 100)
+    monkeypatch.setattr(sketch, "_CELLS", 64)
+    monkeypatch.setattr(sketch, "_KEPT_NODES", 120)
+    monkeypatch.setattr(fading, "_IN_FULL", 50)
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["2d"])
     drawn = sum(map(len, column(path, "/world/tree/start", ":strips")))
@@ -268,7 +268,7 @@ def test_trees_have_names_and_colours(tmp_path: Path) -> None:
 def test_rows_grow_with_what_there_is(first: int, counts: list[int]) -> None:
     """Rows cover everything once, and are no longer than about 1 % of it."""
     for count in counts:
-        ends = drawing.growing_rows(first, count)
+        ends = canvas.growing_rows(first, count)
         sizes = np.diff(ends, prepend=0)
         assert ends[-1] == count
         assert sizes.min() >= 1

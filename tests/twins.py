@@ -22,9 +22,6 @@ from . import naive
 Point = tuple[float, ...]
 Event = tuple[Any, ...]
 
-GLANCES = 8
-"""Links that RRT* with two trees looks at in each iteration, beside the best and the newest."""
-
 
 def told(events: Events) -> list[Event]:
     """A recorded log, as twins have it."""
@@ -435,7 +432,7 @@ class BiRRTStar(Star):
         super().__init__(problem, seed, settings, near, 2)
         self.links: list[tuple[int, int]] = []
         self.shortest: tuple[int, int] | None = None
-        self.turn = self.seen = 0
+        self.turn = 0
 
     def begin(self) -> None:
         """The roots are the newest nodes."""
@@ -468,12 +465,10 @@ class BiRRTStar(Star):
         return one.cost(a) + distance(one.q[a], two.q[b]) + two.cost(b)
 
     def found(self) -> tuple[float, int, int | None]:
-        """The cheapest of the links that are looked at: the best, the newest, and some in turn."""
+        """The cheapest of the links, as the trees stand."""
         if not self.links:
             return math.inf, -1, None
-        looked_at = [self.shortest or self.links[-1], self.links[-1]]
-        for _ in range(min(len(self.links) - 2, GLANCES)):
-            looked_at.append(self.links[self.seen])
-            self.seen = (self.seen + 1) % len(self.links)
-        self.shortest = min(looked_at, key=self.over)
+        best = min(self.links, key=self.over)
+        if self.shortest is None or self.over(best) < self.over(self.shortest):
+            self.shortest = best
         return self.over(self.shortest), *self.shortest

@@ -98,6 +98,7 @@ class RerunSink:
         if self._rec is None:
             return
         try:
+            self._drawing.close()
             figures = self._metrics.as_dict()
             end = {"events": str(figures["events"]), "stamp": BLANK}
             if whole:

@@ -24,12 +24,35 @@ START: Colour = (255, 145, 30)
 GOAL: Colour = (60, 215, 100)
 OTHER: Colour = (180, 120, 255)
 """For what has no colour of its own here."""
-SAMPLES: Mapping[Source, Colour] = {Source.UNIFORM: (135, 143, 158), Source.GOAL: GOAL}
+SAMPLES: Mapping[Source, Colour] = {
+    Source.UNIFORM: (135, 143, 158),
+    Source.GOAL: GOAL,
+    Source.OTHER_TREE: (176, 128, 168),
+    Source.INFORMED: (94, 158, 160),
+}
 REJECTS: Mapping[Reason, Colour] = {
     Reason.COLLISION: (150, 74, 80),
     Reason.NO_PROGRESS: (120, 110, 90),
     Reason.GOAL_BLOCKED: (140, 90, 150),
+    Reason.LINK_BLOCKED: (176, 112, 66),
+    Reason.NEAR_BLOCKED: (108, 66, 72),
+    Reason.NO_GAIN: (84, 90, 108),
+    Reason.LIMITS: (150, 142, 70),
 }
+REWIRED: Mapping[str, Colour] = {"start": (150, 235, 255), "goal": (255, 190, 220)}
+"""New edges of the trees of these names, for a moment."""
+LINK: Colour = (255, 236, 170)
+GHOST: Colour = (150, 128, 60)
+TRACE: Colour = (205, 205, 215)
+ROBOT: Colour = (255, 255, 255)
+NEWEST: Colour = (120, 170, 235)
+LINK_ENTITY, GHOSTS_ENTITY = "/world/link", "/world/path/bodies"
+TRACE_ENTITY, ROBOT_ENTITY, BODY_ENTITY = "/world/trace", "/world/robot", "/world/robot/body"
+CELLS_ENTITY, SEARCH_ENTITY = "/world/cells/expanded", "/world/cells/search"
+_GROWING = (TRACE_ENTITY, CELLS_ENTITY, SEARCH_ENTITY)
+
+_HEAT = ((48, 40, 92), (50, 80, 130), (36, 124, 128), (96, 170, 88), (232, 214, 66))
+"""From cheap to dear."""
 _TREES: Mapping[int, tuple[str, Colour]] = {
     0: ("start", (74, 144, 255)),
     1: ("goal", (255, 82, 82)),
@@ -37,9 +60,12 @@ _TREES: Mapping[int, tuple[str, Colour]] = {
 _PATHS: Mapping[Stage, tuple[Colour, float]] = {
     Stage.RAW: ((255, 240, 100), 1.5),
     Stage.SMOOTHED: ((255, 184, 0), 3.0),
+    Stage.IMPROVED: ((255, 226, 60), 2.5),
 }
 FADING_ITERATIONS, FADING_EVENTS, FADING_SECONDS = 300, 1000, 0.001
 """How long samples and rejections stay in sight on each timeline."""
+_BRIEFER = 5
+"""Rewired edges stay for a part of that: there may be several in an iteration."""
 
 _LAYERS, _OVERLAP = 5, 1.5
 """Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
@@ -59,6 +85,21 @@ def tree_style(number: int) -> tuple[str, Colour]:
 def path_style(stage: Stage) -> tuple[str, Colour, float]:
     """Return a path's name, its colour, and its lines' radius in points of the screen."""
     return (stage.name.lower(), *_PATHS.get(stage, (OTHER, 2.0)))
+
+
+def packed(colour: Colour) -> int:
+    """Return a colour as Rerun packs it."""
+    red, green, blue = colour
+    return red << 24 | green << 16 | blue << 8 | 255
+
+
+def heat(values: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """Return colours for values from 0 to 1, as Rerun packs them, shape (n,)."""
+    at = np.linspace(0, 1, len(_HEAT))
+    red, green, blue = (
+        np.interp(values, at, channel).astype(np.uint32) for channel in np.transpose(_HEAT)
+    )
+    return np.asarray(red << 24 | green << 16 | blue << 8 | 255, np.uint32)
 
 
 def places(values: Any, robot: Robot) -> NDArray[np.float32]:
@@ -275,7 +316,8 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
         rrb.Horizontal(_world_view(manifest, world), right, column_shares=[5, 2]),
         rrb.TimePanel(
             state="collapsed",
-            timeline="iteration",
+            # A robot that drives the path afterwards does so within the planner's last iteration.
+            timeline="event" if manifest.scenario.execute else "iteration",
             play_state="following" if live else "paused",
             fps=100,
         ),
@@ -292,6 +334,13 @@ def _world_view(manifest: Manifest, world: World) -> Any:
         ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS)),
     ]
     shown = {f"/world/tree/{name}": past for name, _ in _TREES.values()}
+    just_now = [
+        ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS // _BRIEFER)),
+        ("event", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_EVENTS // _BRIEFER)),
+        ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS / _BRIEFER)),
+    ]
+    shown |= dict.fromkeys(_GROWING, past)
+    shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
     options: dict[str, Any] = {

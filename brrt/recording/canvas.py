@@ -1,0 +1,158 @@
+"""What everything that is drawn into a recording shares: styles, rows in time, plots, the log."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from brrt.events import Table
+from brrt.recording import scene
+from brrt.recording.columns import line_strips, time_columns
+from brrt.scenario import Manifest
+from brrt.worlds.world import World
+
+MOMENT = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
+"""When something happened."""
+
+
+class Canvas:
+    """A recording to draw into.
+
+    Args:
+        rec: The recording.
+        manifest: The run's.
+        world: The run's.
+    """
+
+    def __init__(self, rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
+        self.world, self.dim, self.robot = world, manifest.dim, manifest.make_robot()
+        flat = scene.is_flat(manifest)
+        self.lines: Any = rr.LineStrips2D if flat else rr.LineStrips3D
+        self.points: Any = rr.Points2D if flat else rr.Points3D
+        self._rec = rec
+        self._news: list[tuple[Any, str]] = []
+
+    def places(self, values: Any) -> NDArray[np.float32]:
+        """Where configurations, shape (n, dof), are drawn, shape (n, dim)."""
+        return scene.places(values, self.robot)
+
+    def style(
+        self, entity: str, archetype: Any, colour: scene.Colour, radius: float, layer: float
+    ) -> None:
+        """Log what all rows of an entity share; a negative radius is in points of the screen."""
+        order = {"draw_order": layer} if self.dim == 2 else {}
+        style = archetype.from_fields(colors=colour, radii=radius, **order)
+        self.still(entity, style)
+
+    def still(self, entity: str, archetype: Any) -> None:
+        """Log what holds at all times."""
+        self._rec.log(entity, archetype, static=True)
+
+    def row_style(
+        self, archetype: Any, rows: int, radius: float, layer: float, colour: int | None = None
+    ) -> Any:
+        """Return a style for each of some rows, for entities that share theirs with many."""
+        given: dict[str, Any] = {"radii": np.full(rows, radius, np.float32)}
+        if colour is not None:
+            given["colors"] = np.full(rows, colour, np.uint32)
+        if self.dim == 2:
+            given["draw_order"] = np.full(rows, layer, np.float32)
+        return archetype.columns(**given)
+
+    def plot_style(self, entity: str, name: str, colour: scene.Colour) -> None:
+        """Name and colour a plot."""
+        line = rr.SeriesLines(names=name.replace("_", " "), colors=colour, widths=1.5)
+        self.still(entity, line)
+
+    def plot_dots(self, entity: str, name: str, colour: scene.Colour) -> None:
+        """Show the values of a plot as dots too."""
+        dots = rr.SeriesPoints(colors=colour, marker_sizes=3, names=name)
+        self.still(entity, dots)
+
+    def plot(self, entity: str, rows: Table, values: Any) -> None:
+        """Plot a value at each row's time."""
+        self._rec.send_columns(entity, time_columns(rows), rr.Scalars.columns(scalars=values))
+
+    def strips(self, places: NDArray[np.float32], lengths: Any) -> Any:
+        """Return lines through places, one after the other; see `line_strips`."""
+        return self.lines.columns(strips=line_strips(places, lengths))
+
+    def send(self, entity: str, rows: Table, ends: NDArray[np.int64], columns: Any) -> None:
+        """Send items in rows; each row has the time of its last event."""
+        self.send_rows(entity, rows[ends - 1], np.diff(ends, prepend=0), columns)
+
+    def send_rows(
+        self,
+        entity: str,
+        moments: Table,
+        counts: NDArray[Any],
+        columns: Any,
+        style: Any = (),
+    ) -> None:
+        """Send so many items at each of some moments, and a style in each row if there is one."""
+        parts = [*columns.partition(counts), *style]
+        self._rec.send_columns(entity, time_columns(moments), parts)
+
+    def put_away(self, entity: str, event: Any, place: NDArray[np.float32]) -> None:
+        """From an event on, shrink an entity that grows to a place where a mark covers it.
+
+        What is shown up to the cursor stays: neither Clear nor an empty row takes a row away. But
+        there is one transform at each instant, so that it also comes back on the way back.
+        """
+        where = np.zeros((1, 3), np.float32)
+        where[0, : self.dim] = place
+        columns = rr.Transform3D.columns(translation=where, scale=np.full((1, 3), 1e-6, np.float32))
+        self._rec.send_columns(entity, time_columns(moments([event])), columns)
+
+    def tell(self, event: Any, text: str) -> None:
+        """Say something in the log at the time of an event."""
+        self._news.append((event, text))
+
+    def tell_news(self) -> None:
+        """Write what has been said to the log, in order."""
+        if self._news:
+            self._news.sort(key=lambda item: int(item[0]["seq"]))
+            texts = rr.TextLog.columns(text=[text for _, text in self._news])
+            rows = moments(event for event, _ in self._news)
+            self._rec.send_columns("/log", time_columns(rows), texts)
+            self._news.clear()
+
+
+def growing_rows(first: int, count: int) -> NDArray[np.int64]:
+    """Cut items into rows of about 1 % of what there is, from 1 item up to 1024.
+
+    A viewer takes time for each row, and shows a row at once: so the first edges of a tree appear
+    one by one, and the many that follow in rows.
+
+    Args:
+        first: Items before these.
+        count: Items to cut, at least 1.
+
+    Returns:
+        The end of each row, exclusive, counted from `first`; the last is `count`.
+    """
+    number = np.arange(first, first + count)
+    row = np.where(number < 1 << 16, 64 * np.log2(number + 1.0), number / 1024).astype(np.int64)
+    return np.append(np.flatnonzero(np.diff(row)) + 1, count)
+
+
+def moments(events: Iterable[Any]) -> Table:
+    """Gather the times of events of several kinds."""
+    return np.array([(e["seq"], e["t"], e["iteration"]) for e in events], MOMENT)
+
+
+def merged(tables: Iterable[Table], *fields: str) -> Table:
+    """Bring the times and some fields of tables into one, in the order of `seq`."""
+    tables = list(tables)
+    types = next(table.dtype for table in tables)
+    dtype = np.dtype([(name, types[name]) for name in ("seq", "t", "iteration", *fields)])
+    parts = []
+    for table in tables:
+        part = np.empty(len(table), dtype)
+        for name in dtype.names or ():
+            part[name] = table[name]
+        parts.append(part)
+    joined = np.concatenate(parts)
+    return joined[np.argsort(joined["seq"], kind="stable")]

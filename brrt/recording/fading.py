@@ -1,0 +1,93 @@
+"""What is shown for a moment: samples, rejected extensions, edges that were rewired."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Reason, Source, Table
+from brrt.recording import scene
+from brrt.recording.canvas import Canvas
+from brrt.recording.sketch import Sketch
+
+_IN_FULL, _STRIDE = 10_000, 16
+"""Items of a kind that are all drawn; then one of so many."""
+
+_ROW = 16
+"""Items in a row; they appear and vanish by rows."""
+
+
+class Fading:
+    """Draws what the layout lets fade.
+
+    Args:
+        canvas: Where it is drawn.
+        sketches: The trees, or the cells in place of tree 0.
+    """
+
+    def __init__(self, canvas: Canvas, sketches: Mapping[int, Sketch]) -> None:
+        self._canvas, self._sketches = canvas, sketches
+        self._seen: dict[str, int] = {}
+        for source, colour in scene.SAMPLES.items():
+            canvas.style(f"/world/samples/{source.name.lower()}", canvas.points, colour, -2, 30.0)
+        for reason, colour in scene.REJECTS.items():
+            entity = f"/world/rejected/{reason.name.lower()}"
+            canvas.style(entity, canvas.lines, colour, -0.5, 10.0)
+        for name, colour in scene.REWIRED.items():
+            canvas.style(f"/world/rewired/{name}", canvas.lines, colour, -1.25, 25.0)
+
+    def samples(self, table: Table) -> None:
+        """Draw samples."""
+        for source in Source:
+            mine = table[table["source"] == source]
+            name = source.name.lower()
+            rows = mine[self._shown(mine, f"{name} samples")]
+            if len(rows):
+                points = self._canvas.points.columns(positions=self._canvas.places(rows["q"]))
+                self._canvas.send(f"/world/samples/{name}", rows, _even_rows(len(rows)), points)
+
+    def rejects(self, table: Table) -> None:
+        """Draw from where to where extensions were tried in vain."""
+        for reason in Reason:
+            mine = table[table["reason"] == reason]
+            name = reason.name.lower()
+            rows = mine[self._shown(mine, f"{name} rejections")]
+            if len(rows):
+                self._send_lines(f"rejected/{name}", rows, self._attempts(rows))
+
+    def rewired(self, tree: str, table: Table, ends: NDArray[np.float32]) -> None:
+        """Highlight the new edges of a tree by their ends, shape (2 n, dim)."""
+        shown = self._shown(table, f"rewired edges of the {tree} tree")
+        if shown.any():
+            kept = ends.reshape(-1, 2, self._canvas.dim)[shown].reshape(-1, self._canvas.dim)
+            self._send_lines(f"rewired/{tree}", table[shown], kept)
+
+    def _send_lines(self, name: str, rows: Table, ends: NDArray[np.float32]) -> None:
+        strips = self._canvas.strips(ends, 2)
+        self._canvas.send(f"/world/{name}", rows, _even_rows(len(rows)), strips)
+
+    def _attempts(self, rejects: Table) -> NDArray[np.float32]:
+        """Return where each extension left from and wanted to go, shape (2 n, dim)."""
+        dim = self._canvas.dim
+        ends = np.full((len(rejects), 2, dim), np.nan, np.float32)
+        for number, sketch in self._sketches.items():
+            mine = rejects["tree"] == number
+            ends[mine, 0] = sketch.places(rejects["node"][mine])
+        ends[:, 1] = self._canvas.places(rejects["q"])
+        return ends.reshape(-1, dim)
+
+    def _shown(self, table: Table, what: str) -> NDArray[Any]:
+        """Tell which rows of a table are drawn: not all if there have been many."""
+        first = self._seen.get(what, 0)
+        self._seen[what] = first + len(table)
+        if first <= _IN_FULL < first + len(table):
+            text = f"{what}: beyond {_IN_FULL:,} one in {_STRIDE} is drawn"
+            self._canvas.tell(table[-1], text)
+        number = np.arange(first, first + len(table))
+        shown: NDArray[Any] = (number < _IN_FULL) | (number % _STRIDE == 0)
+        return shown
+
+
+def _even_rows(count: int) -> NDArray[np.int64]:
+    return np.append(np.arange(_ROW, count, _ROW), count)

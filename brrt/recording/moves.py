@@ -1,0 +1,63 @@
+"""The robot as it moves: where it is, and the way it has come."""
+
+import numpy as np
+
+from brrt.events import Events, Kind, Table
+from brrt.recording import scene
+from brrt.recording.canvas import Canvas, growing_rows
+from brrt.recording.paths import draw_bodies
+from brrt.recording.sketch import DRAWN_IN_FULL, Thinning
+from brrt.scenario import Manifest
+
+_IN_FULL, _STRIDE = 10_000, 16
+"""Moves after each of which the robot is shown; then after one of so many."""
+
+
+class Moves:
+    """Draws moves.
+
+    Args:
+        canvas: Where they are drawn.
+        manifest: The run's.
+    """
+
+    def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
+        self._canvas, self._thinning = canvas, Thinning(canvas.world)
+        self._start = canvas.places([manifest.start])
+        self._at, self._drawn = self._start, 0
+        canvas.style(scene.TRACE_ENTITY, canvas.lines, scene.TRACE, -0.5, 28.0)
+        canvas.style(scene.ROBOT_ENTITY, canvas.points, scene.ROBOT, -5, 60.0)
+        if canvas.dim == 2:
+            canvas.style(scene.BODY_ENTITY, canvas.lines, scene.ROBOT, -1.5, 55.0)
+
+    def write(self, events: Events) -> None:
+        """Draw the moves of a batch."""
+        table = events[Kind.MOVE]
+        if len(table):
+            before = self._thinning.count
+            places = self._draw_trace(table)
+            number = np.arange(before, before + len(table))
+            shown = (number < _IN_FULL) | (number % _STRIDE == 0)
+            shown[-1] = True
+            rows, ones = table[shown], np.ones(shown.sum(), np.int64)
+            points = self._canvas.points.columns(positions=places[shown])
+            self._canvas.send_rows(scene.ROBOT_ENTITY, rows, ones, points)
+            if self._canvas.robot.outline(table["q"][0]):
+                draw_bodies(self._canvas, scene.BODY_ENTITY, rows, [[q] for q in rows["q"]])
+
+    def _draw_trace(self, table: Table) -> np.ndarray:
+        places = self._canvas.places(table["q"])
+        froms = np.concatenate([self._at, places[:-1]])
+        froms[table["step"] == 1] = self._start  # where each trial begins
+        self._at = places[-1:]
+        worth = self._thinning.worth(places)
+        if self._thinning.begins_within(len(table)):
+            text = f"moves: beyond {DRAWN_IN_FULL:,} only those to new places are drawn"
+            self._canvas.tell(table[-1], text)
+        if worth.any():
+            rows = table[worth]
+            lines = np.stack([froms[worth], places[worth]], axis=1).reshape(-1, self._canvas.dim)
+            ends = growing_rows(self._drawn, len(rows))
+            self._canvas.send(scene.TRACE_ENTITY, rows, ends, self._canvas.strips(lines, 2))
+            self._drawn += len(rows)
+        return places

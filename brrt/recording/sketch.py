@@ -1,0 +1,122 @@
+"""What a drawing knows of nodes or cells: where they are, and which of them are worth drawing."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.worlds.world import World
+
+DRAWN_IN_FULL = 50_000
+"""Nodes up to which every edge is drawn."""
+
+_CELLS = 1 << 16
+"""Cells of the grid over the world that thins out what comes after: a cell then takes one edge. So
+a million edges stay a picture that a viewer can turn, and yet every place that is reached shows."""
+
+_KEPT_NODES = 1 << 19
+"""Nodes whose places are kept (16 bytes each in 3D); edges that leave from later ones are not
+drawn."""
+
+
+class Thinning:
+    """Takes everything up to a number, and then what reaches new places.
+
+    Args:
+        world: Where these are.
+
+    Attributes:
+        count: Items that have come.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.count = 0
+        side = int(_CELLS ** (1 / world.dim))
+        self._lower, self._scale = world.lower, side / (world.upper - world.lower)
+        self._grid = (side,) * world.dim
+        self._taken = np.zeros(side**world.dim, np.bool_)
+
+    def worth(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
+        wanted = np.ones(len(places), np.bool_)
+        steps = ((places - self._lower) * self._scale).astype(np.int64)
+        cells = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
+        if self.count + len(places) > DRAWN_IN_FULL:
+            number = np.arange(self.count, self.count + len(places))
+            first_in_cell = np.zeros(len(places), np.bool_)
+            first_in_cell[np.unique(cells, return_index=True)[1]] = True
+            wanted = (number < DRAWN_IN_FULL) | (first_in_cell & ~self._taken[cells])
+        self._taken[cells] = True
+        self.count += len(places)
+        return wanted
+
+    def begins_within(self, count: int) -> bool:
+        """Whether it first left something out among the last so many items."""
+        return self.count - count <= DRAWN_IN_FULL < self.count
+
+
+class Sketch:
+    """The nodes of a tree, or the cells of a lattice, as far as they have come.
+
+    Args:
+        world: Where they are.
+
+    Attributes:
+        drawn: Nodes that were worth drawing; each has a slot, numbered from 0.
+        thinning: What decides about that.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.drawn, self.thinning = 0, Thinning(world)
+        self._places = np.full((1024, world.dim), np.nan, np.float32)
+        self._slots = np.full(1024, -1, np.int32)
+
+    @property
+    def nodes(self) -> int:
+        """Nodes that have joined."""
+        return self.thinning.count
+
+    def join(
+        self, nodes: NDArray[np.int32], places: NDArray[np.float32], wanted: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """Take in new nodes.
+
+        Args:
+            nodes: Their numbers, shape (n,).
+            places: Where they are, shape (n, dim).
+            wanted: Whether they are to be drawn if they are worth it.
+
+        Returns:
+            Which of them have got the next slots.
+        """
+        which = np.flatnonzero(wanted & self.thinning.worth(places))
+        self._make_room(nodes)
+        kept = (nodes >= 0) & (nodes < _KEPT_NODES)
+        self._places[nodes[kept]] = places[kept]
+        slots = np.full(len(nodes), -1, np.int32)
+        slots[which] = np.arange(self.drawn, self.drawn + len(which))
+        self._slots[nodes[kept]] = slots[kept]
+        self.drawn += len(which)
+        return which
+
+    def places(self, nodes: NDArray[np.int32]) -> NDArray[np.float32]:
+        """Where nodes are, shape (n, dim); NaN, which no viewer draws, where that is not kept."""
+        found = self._places[np.clip(nodes, 0, len(self._places) - 1)]
+        found[(nodes < 0) | (nodes >= len(self._places))] = np.nan
+        return found
+
+    def knows(self, nodes: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Whether nodes have joined, as far as that is kept: later ones pass for known."""
+        found = np.isfinite(self.places(nodes)).all(axis=1)
+        return np.asarray(found | (nodes >= _KEPT_NODES))
+
+    def slots(self, nodes: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Slots of nodes, shape (n,); -1 for those that are not drawn."""
+        found = self._slots[np.clip(nodes, 0, len(self._slots) - 1)]
+        found[(nodes < 0) | (nodes >= len(self._slots))] = -1
+        return found
+
+    def _make_room(self, nodes: NDArray[np.int32]) -> None:
+        need, have = min(int(nodes.max(initial=-1)) + 1, _KEPT_NODES), len(self._places)
+        if need > have:
+            room = (0, min(max(need, 2 * have), _KEPT_NODES) - have)
+            self._places = np.pad(self._places, (room, (0, 0)), constant_values=np.nan)
+            self._slots = np.pad(self._slots, room, constant_values=-1)
