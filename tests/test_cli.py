@@ -300,7 +300,7 @@ def test_cache_folder_may_be_all_that_is_writable(tmp_path: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env
     )
     assert where.stdout.strip() == "None"
-    plan = [sys.executable, "-m", "brrt_cli", "plan", "--no-record", "--iterations", "5"]
+    plan = [sys.executable, "-m", "brrt_cli", "plan", "--no-record", "--start", "-1,5"]
     said = subprocess.run(plan, capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
     assert "again in each run" in said.stderr
     assert "BRRT_CACHE_DIR" in said.stderr
