@@ -165,7 +165,8 @@ def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -
     from brrt.replay.diff import first_difference  # noqa: PLC0415
 
     found = first_difference(
-        Saved(recording, partial=partial, verb=_VERB), Saved(golden, partial=False, verb=_VERB)
+        Saved(recording, partial=partial, verb=_VERB),
+        Saved(golden, partial=False, verb=_VERB),
     )
     return None if found is None else str(found)
 
