@@ -223,11 +223,11 @@ def _warn_of_compiling() -> None:
 
     if CACHE_FOLDER is None:
         note(
-            "compiling the planner (about 15 s), again in each run: no folder to keep it in can be "
+            "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
             "written; name one in the variable BRRT_CACHE_DIR"
         )
     elif is_cold():
-        note("compiling the planner for this machine, once (about 15 s)")
+        note("compiling the planner for this machine, once (10 to 20 s)")
 
 
 def _show(metrics: "Metrics", watch: Watch) -> None:
