@@ -12,6 +12,9 @@ from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 
+_DRAWS = 10_000
+"""Draws of a random configuration before the world is called too full for the robot."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
@@ -65,3 +68,26 @@ class Problem:
     def dof(self) -> int:
         """Numbers in a configuration."""
         return self.robot.dof(self.world)
+
+
+def random_configuration(name: str, robot: Robot, world: World, rng: np.random.Generator) -> Floats:
+    """Draw a free configuration, evenly from all that are free, shape (dof,).
+
+    Args:
+        name: What it is for, for the message.
+        robot: What moves; settled in the world.
+        world: Bounds and obstacles.
+        rng: Where the draws come from.
+
+    Raises:
+        BrrtError: Nothing free was found.
+    """
+    space = robot.space(world)
+    for _ in range(_DRAWS):
+        q = robot.canonical(rng.uniform(space.lower, space.upper))
+        if robot.collision(world, q) is None:
+            return q
+    raise BrrtError(
+        f"none of {_DRAWS:,} random configurations for the {name} is free in world {world.name}; "
+        f"give --{name} or make the obstacles smaller or fewer"
+    )

@@ -99,12 +99,11 @@ class Run:
             path = _last_path(batch, path)
             moved = moved or Kind.MOVE in batch.counts
             # A planner may have gone on after its path; the count never falls.
-            iteration = batch.last.iteration if len(batch) else iteration
+            iteration = max(iteration, batch.last.iteration)
             yield batch
         if path is None:
             return
-        waypoints = path["waypoints"]
-        space = self.problem.space
+        waypoints, space = path["waypoints"], self.problem.space
         if self._smoother is not None and not self.stop.interrupted:
             for batch in self._smoother.smooth(
                 waypoints, space, rng, self._log, self.stop, iteration

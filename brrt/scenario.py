@@ -14,12 +14,18 @@ from brrt.planners import PLANNERS, Planner
 from brrt.planners.execute import Execute
 from brrt.planners.shortcut import Shortcut
 from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.problem import Problem, random_configuration
 from brrt.robots import Robot, make_robot, names_robot_file, robot_from_json
 from brrt.worlds import World, make_world
 
+RANDOM: Literal["random"] = "random"
+"""A start or goal that the scenario's seed decides."""
+
 _MOST = 10**15
 """Above any count that a run could reach, and well within 64 bits."""
+
+_NOWHERE = np.full(3, np.nan)
+"""Stands for a configuration until it is drawn: robots that stand somewhere still say where."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +37,10 @@ class Scenario:
         robot: A robot with parameters (`polygon:length=4`) or a file.
         planner: Name of a planner.
         params: The planner's settings where they differ from its defaults.
-        start: First configuration; the world's own by default.
-        goal: Last configuration; the world's own by default.
-        seed: Seed of every random draw of the planner and the smoother.
+        start: First configuration, or `random`; the world's own by default.
+        goal: Last configuration, or `random`; the world's own by default.
+        seed: Seed of every random draw of the planner and the smoother, and of a random start or
+            goal, which have streams of their own: whatever else is random stays as it is.
         iterations: Iterations that the planner may make; by default as many as there is time for
             or, without a limit of time, the planner's own default.
         draws: Draws that it may make, whether they count as iterations or not; for a re-run.
@@ -50,8 +57,8 @@ class Scenario:
     robot: str = "point"
     planner: str = "rrt"
     params: Mapping[str, Any] = field(default_factory=dict)
-    start: tuple[float, ...] | None = None
-    goal: tuple[float, ...] | None = None
+    start: tuple[float, ...] | Literal["random"] | None = None
+    goal: tuple[float, ...] | Literal["random"] | None = None
     seed: int = 0
     iterations: int | None = None
     draws: int | None = None
@@ -75,6 +82,9 @@ class Scenario:
         for name in ("smooth", "execute"):
             if not isinstance(getattr(self, name), bool):
                 raise BrrtError(f"{name} must be true or false, not {getattr(self, name)!r}")
+        for name in ("start", "goal"):
+            if isinstance(getattr(self, name), str) and getattr(self, name) != RANDOM:
+                raise _no_configuration(name, getattr(self, name))
         if not names_robot_file(self.robot):
             make_robot(self.robot)
         if self.clock not in ("real", "logical"):
@@ -189,14 +199,22 @@ class Scenario:
     def make_problem(self, world: World | None = None, robot: Robot | None = None) -> Problem:
         """Make the world and the robot, unless they are at hand, and put the query into them.
 
+        A random start or goal is drawn in the world as it is: a generator keeps its corners free
+        and not the places that are drawn later, so that each seed has its query in one world.
+
         Raises:
             BrrtError: World or robot cannot be made, or start or goal is missing or of no use.
         """
         robot = self.make_robot() if robot is None else robot
-        ends = [None if q is None else np.array(q) for q in (self.start, self.goal)]
+        given = (self.start, self.goal)
+        ends = [q if q is None else _NOWHERE if isinstance(q, str) else np.array(q) for q in given]
         if world is None:
             first, last = (None if q is None else robot.position(q) for q in ends)
             world = make_world(self.world, first, last, robot.room)
+        for place, name in enumerate(("start", "goal")):
+            if isinstance(given[place], str):
+                rng = np.random.Generator(np.random.PCG64([self.seed, place + 1]))
+                ends[place] = random_configuration(name, robot.settled(world), world, rng)
         start, goal = (
             given if given is not None or own is None else robot.configuration(own)
             for given, own in zip(ends, (world.start, world.goal), strict=True)
@@ -225,12 +243,18 @@ def _whole(name: str, value: Any, *, low: int) -> None:
         raise BrrtError(f"{name} must be at most {_MOST:,}, not {value}")
 
 
-def _configuration(name: str, value: Any) -> tuple[float, ...]:
+def _configuration(name: str, value: Any) -> tuple[float, ...] | Literal["random"]:
+    if isinstance(value, str) and value.strip() == RANDOM:
+        return RANDOM
     parts = value.split(",") if isinstance(value, str) else value
     try:
         return tuple(float(part) for part in parts)
     except (TypeError, ValueError):
-        raise BrrtError(f"{name} must be numbers like 1,2 and not {value!r}") from None
+        raise _no_configuration(name, value) from None
+
+
+def _no_configuration(name: str, value: Any) -> BrrtError:
+    return BrrtError(f"{name} must be numbers like 1,2, or random, and not {value!r}")
 
 
 @dataclass(frozen=True, slots=True)

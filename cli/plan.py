@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import Code, Watch, note, out, print_json, print_summary
+from .numbers import whole_number
 
 if TYPE_CHECKING:
     from brrt.replay.metrics import Metrics
@@ -36,14 +37,16 @@ def plan(
     start: Annotated[
         str | None,
         typer.Option(
-            help="Start configuration, as 5,5 or 1,2,3.",
+            help="Start configuration, as 5,5 or 1,2,3, or random: a free one, from the seed.",
             metavar="X,Y[,Z]",
             rich_help_panel="Problem",
         ),
     ] = None,
     goal: Annotated[
         str | None,
-        typer.Option(help="Goal configuration.", metavar="X,Y[,Z]", rich_help_panel="Problem"),
+        typer.Option(
+            help="Goal configuration, or random.", metavar="X,Y[,Z]", rich_help_panel="Problem"
+        ),
     ] = None,
     planner: Annotated[
         str | None,
@@ -64,7 +67,10 @@ def plan(
     iterations: Annotated[
         int | None,
         typer.Option(
-            help="Iterations before giving up. Default: the planner's own; with --time, no limit.",
+            help="Iterations before giving up, as 5000 or 1e6. Default: the planner's own; with "
+            "--time, no limit.",
+            parser=whole_number,
+            metavar="INTEGER",
             rich_help_panel="Planner",
         ),
     ] = None,
@@ -213,10 +219,15 @@ def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> li
 
 
 def _warn_of_compiling() -> None:
-    from brrt.kernels.jit import is_cold  # noqa: PLC0415
+    from brrt.kernels.jit import CACHE_FOLDER, is_cold  # noqa: PLC0415
 
-    if is_cold():
-        note("compiling the planner for this machine, once (about 15 s)")
+    if CACHE_FOLDER is None:
+        note(
+            "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
+            "written; name one in the variable BRRT_CACHE_DIR"
+        )
+    elif is_cold():
+        note("compiling the planner for this machine, once (10 to 20 s)")
 
 
 def _show(metrics: "Metrics", watch: Watch) -> None:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import Code, note, out, print_json, print_rows, print_summary
+from .saved import Saved
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from brrt.events import Events
+    from brrt.events import Events, Instant
     from brrt.recording import Recording
+
+_VERB = "replay them"
 
 
 def replay(
@@ -71,7 +72,9 @@ def replay(
     metrics = Metrics(recording.manifest)
     trees = _Trees()
     sinks: list[Any] = [metrics] if as_json else [metrics, trees]
-    _feed(recording, sinks, limits, partial=partial)
+    end = _feed(recording, sinks, limits, partial=partial)
+    if end is not None:
+        _note_if_beyond(limits, *end)
     if rrd is not None:
         from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
 
@@ -80,7 +83,8 @@ def replay(
             _feed(recording, [sink], limits, partial=partial)
         finally:
             sink.close(whole=recording.result is not None and not limits)
-    difference = None if check is None else _difference(recording, check, partial=partial)
+    golden = None if check is None else read(check)
+    difference = None if golden is None else _difference(recording, golden, partial=partial)
     figures = metrics.as_dict()
     if as_json:
         verdict = {} if check is None else {"check": {"equal": not difference, "first": difference}}
@@ -88,8 +92,11 @@ def replay(
     else:
         print_summary(figures)
         trees.show()
-        if check is not None:
-            out.print(difference or f"equal to {check}, event by event", markup=False)
+        if golden is not None:
+            seeds = [each.manifest.scenario.seed for each in (recording, golden)]
+            against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"
+            outcome = f"part at {difference}" if difference else "are equal, event by event"
+            out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
     if difference:
         raise typer.Exit(Code.FAILED)
 
@@ -122,40 +129,44 @@ def _nanoseconds(text: str) -> int:
 
 def _feed(
     recording: "Recording", sinks: list[Any], limits: dict[str, int], *, partial: bool
-) -> None:
-    """Hand the events up to the limits to the sinks."""
-    for batch in _whole(recording, partial=partial):
+) -> "tuple[int, Instant] | None":
+    """Hand the events up to the limits to the sinks.
+
+    Returns:
+        How many events there are and when the last one happened; None if the limits cut them.
+    """
+    from brrt.events import Instant  # noqa: PLC0415
+
+    count, last = 0, Instant(0, 0)
+    for batch in Saved(recording, partial=partial, verb=_VERB):
         part = batch.until(**limits) if limits else batch
         for sink in sinks:
             sink.write(part)
         if len(part) < len(batch):
-            break
+            return None
+        count, last = count + len(batch), batch.last if len(batch) else last
+    return count, last
 
 
-def _whole(recording: "Recording", *, partial: bool) -> "Iterator[Events]":
-    """Yield the batches; where the file is cut, say what was saved."""
-    from brrt.errors import RecordingError  # noqa: PLC0415
-    from brrt.recording import CutError  # noqa: PLC0415
-
-    events, last = 0, 0
-    try:
-        for batch in recording.batches():
-            events += len(batch)
-            last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
-            yield batch
-    except CutError as error:
-        saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
-        if not partial:
-            raise RecordingError(f"{error}; {saved}: replay them with --partial") from None
-        note(f"{error}; {saved}")
+def _note_if_beyond(limits: dict[str, int], count: int, last: "Instant") -> None:
+    """Say so where the instant asked for lies after the end of the recording."""
+    ends = {"seq": count - 1, "t": last.t, "iteration": last.iteration}
+    texts = {
+        "seq": f"with event {count - 1:,}",
+        "t": f"at {last.t / 1e9:.6f} s",
+        "iteration": f"with iteration {last.iteration:,}",
+    }
+    for name, limit in limits.items():
+        if limit > ends[name]:
+            note(f"the recording ends {texts[name]}; this is how it stood then")
 
 
-def _difference(recording: "Recording", golden: Path, *, partial: bool) -> str | None:
-    from brrt.recording import read  # noqa: PLC0415
+def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:
     from brrt.replay.diff import first_difference  # noqa: PLC0415
 
     found = first_difference(
-        _whole(recording, partial=partial), _whole(read(golden), partial=False)
+        Saved(recording, partial=partial, verb=_VERB),
+        Saved(golden, partial=False, verb=_VERB),
     )
     return None if found is None else str(found)
 

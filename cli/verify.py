@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, note, out, print_json, print_rows
+from .console import Code, note, out, print_json
+from .saved import Saved
 
 if TYPE_CHECKING:
     from brrt.replay.checks import Tally
 
-_SHOWN = 10
+_SHOWN = 3
+_WIDTH = 80
 
 
 def verify(
@@ -18,28 +20,52 @@ def verify(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object instead of the table.")
     ] = False,
+    partial: Annotated[
+        bool,
+        typer.Option(
+            "--partial",
+            help="Judge what is whole of a file that was cut; what is promised of a run's end "
+            "is left out.",
+        ),
+    ] = False,
+    long: Annotated[
+        bool, typer.Option("--long", help="Write each promise out in full, below its rule.")
+    ] = False,
 ) -> None:
     """Hold a recording to what its planner promises, by code that is not the planner's.
 
     Exit code 0: every promise is kept; 1: one is broken.
 
     brrt verify run.mcap
+
+    brrt verify run.mcap --long
     """
-    from brrt.planners import PLANNERS  # noqa: PLC0415 - keep --help fast
+    from brrt.events import Events  # noqa: PLC0415 - keep --help fast
+    from brrt.planners import PLANNERS  # noqa: PLC0415
     from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.checks import examine  # noqa: PLC0415
 
     recording = read(run)
     planner = recording.manifest.scenario.planner
-    tallies = examine(recording.manifest, recording.world, recording.events())
+    saved = Saved(recording, partial=partial, verb="verify them")
+    events = Events.concat(recording.manifest.dof, saved)
+    tallies = examine(recording.manifest, recording.world, events, cut=saved.cut)
     broken = sum(tally.broken for tally in tallies)
     if as_json:
         known = planner in PLANNERS
-        print_json({"holds": not broken, "planner_known": known, "rules": _json(tallies)})
+        print_json(
+            {
+                "holds": not broken,
+                "planner_known": known,
+                "cut": saved.cut,
+                "events": len(events),
+                "rules": _json(tallies),
+            }
+        )
     else:
         if planner not in PLANNERS:
             note(f"planner {planner} is not known here; its special promises were not checked")
-        _show(tallies)
+        _show(tallies, long=long)
     if broken:
         raise typer.Exit(Code.FAILED)
 
@@ -60,26 +86,34 @@ def _json(tallies: "list[Tally]") -> list[dict[str, Any]]:
     ]
 
 
-def _show(tallies: "list[Tally]") -> None:
-    """Print a line a rule that had anything to look at, then the first findings."""
-    print_rows(
-        [
-            {
-                "rule": tally.rule,
-                "examined": f"{tally.examined:,}",
-                "": f"{tally.broken:,} broken" if tally.broken else "holds",
-                "promise": tally.promise,
-            }
-            for tally in tallies
-            if tally.examined
-        ]
-    )
-    findings = sorted((f for tally in tallies for f in tally.findings), key=lambda f: f.seq)
-    if findings:
-        out.print()
-    for found in findings[:_SHOWN]:
-        where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
-        out.print(f"{where}: {found.rule}: {found.message}", markup=False, soft_wrap=True)
-    more = sum(tally.broken for tally in tallies) - min(len(findings), _SHOWN)
-    if more:
-        out.print(f"... and {more:,} more")
+def _show(tallies: "list[Tally]", *, long: bool) -> None:
+    """Print a line a rule that had anything to look at, broken ones first with what they found."""
+    looked = sorted((t for t in tallies if t.examined), key=lambda tally: not tally.broken)
+    name = max((len(tally.rule) for tally in looked), default=0)
+    count = max((len(f"{tally.examined:,}") for tally in looked), default=0)
+    for tally in looked:
+        verdict = f"BROKEN {tally.broken:,} times" if tally.broken else "holds"
+        line = f"{tally.rule:{name}}  {tally.examined:>{count},}  {verdict:6}"
+        promise = "" if long or tally.broken else _short(tally.promise, _WIDTH - len(line) - 2)
+        out.print(f"{line}  {promise}".rstrip(), style=_style(tally), markup=False, soft_wrap=True)
+        if long or tally.broken:
+            out.print(f"  {tally.promise}", style="dim", markup=False, soft_wrap=True)
+        for found in tally.findings[:_SHOWN]:
+            where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
+            out.print(f"  {where}: {found.message}", markup=False, soft_wrap=True)
+        if tally.broken > _SHOWN:
+            out.print(f"  ... and {tally.broken - _SHOWN:,} more")
+    broken = sum(bool(tally.broken) for tally in looked)
+    total = f"{len(looked)} rules, {broken} broken" if broken else f"all {len(looked)} rules hold"
+    out.print(total, style="bold red" if broken else "bold green")
+
+
+def _style(tally: "Tally") -> str:
+    return "bold red" if tally.broken else ""
+
+
+def _short(promise: str, room: int) -> str:
+    """Cut a promise at a word, so that its line is no longer than a terminal."""
+    if len(promise) <= room:
+        return promise
+    return promise[: room - 3].rpartition(" ")[0].rstrip(",;:") + " ..."

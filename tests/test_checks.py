@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import Events, Kind, Manifest, Memory, Run, Scenario, World, check
-from brrt.events import Phase, Status, table_dtype
+from brrt import Events, Kind, Manifest, McapSink, Memory, Run, Scenario, World, check
+from brrt.events import Phase, Reason, Status, table_dtype
 from brrt.planners.contract import Contract, Near
 from brrt.replay.checks import RULES, examine
 
-from .test_rrt import scenarios
+from . import scenarios
+from .conftest import Result
 from .toys import TOYS
 
 PLANNERS = ("rrt", "rrt-connect", "bi-rrt", "rrt-star", "bi-rrt-star", "lrta-star", "a-star")
@@ -125,18 +127,28 @@ def test_toys_have_no_findings(name: str, seed: int) -> None:
     assert check(run.manifest, run.problem.world, memory.events()) == []
 
 
-@settings(max_examples=60, deadline=None)
-@given(scenarios(), st.sampled_from(list(PLANNERS)), st.booleans())
-def test_contracts_hold(scenario: Scenario, planner: str, smooth: bool) -> None:
-    """Whatever world, seed and settings: no finding."""
-    shared: tuple[str, ...] = ("step",) if "rrt" in planner else ()
-    shared = tuple(scenario.params) if planner == "rrt" else shared
-    params = {name: value for name, value in scenario.params.items() if name in shared}
-    chosen = replace(scenario, planner=planner, params=params, smooth=smooth)
-    memory = Memory()
-    run = Run(chosen)
+@settings(max_examples=150, deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    planner=st.sampled_from(scenarios.PLANNERS),
+    body=st.sampled_from(["polygon", "chain 3"]),
+    solid=st.booleans(),
+)
+def test_contracts_hold(
+    seed: int, planner: str, body: str, solid: bool, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Whatever world, robot, seed and settings: no finding, nor where the log is cut."""
+    point = ("point 2D", "point 3D")[seed % 2]
+    robot = body if solid and planner in scenarios.TREES else point
+    scenario = scenarios.draw(seed, tmp_path_factory.getbasetemp(), planner, robot)
+    memory, run = Memory(), Run(scenario)
     run.execute([memory])
-    assert check(run.manifest, run.problem.world, memory.events()) == []
+    log = memory.events()
+    found = check(run.manifest, run.problem.world, log)
+    assert found == [], scenarios.command(scenario)
+    part = log.until(seq=seed % len(log))
+    for tally in examine(run.manifest, run.problem.world, part, cut=True):
+        assert not tally.broken, (tally.findings, scenarios.command(scenario))
 
 
 def leaf(case: Evidence) -> int:
@@ -345,8 +357,190 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("estimates", "walk", falling_h, {"choices"}),
     ("estimates admissible", "walk", bad_h, {"choices"}),
     ("lattice moves", "walk", lambda c: lattice_of(c, epsilon=5.0), {"choices"}),
-    ("choices", "walk", foolish, set()),
+    ("choices", "walk", foolish, {"rejections"}),
+    ("rejections", "rrt", lambda c: c.edit(
+        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0] + 0.01), set()),
+    ("rejections", "rrt", lambda c: c.edit(Kind.REJECT, 0, node=10**6), set()),
+    ("rejections", "a-star", lambda c: c.edit(
+        Kind.REJECT, -1, node=0, q=c.log[Kind.EXPAND]["q"][0]), set()),
+    ("limits", "rrt", lambda c: c.edit(Kind.REJECT, 0, reason=Reason.LIMITS), set()),
 ]  # fmt: skip
+
+
+BODIES = {
+    "polygon": Scenario(
+        world="circles2d:n=25,seed=3", robot="polygon:length=6,width=3", seed=3, clock="logical",
+        iterations=1000,
+    ),
+    "chain": Scenario(
+        world="circles2d:n=12,seed=2,max_radius=4",
+        robot="chain:links=3,length=9,width=1,self_collision=true,limit=3",
+        start=(0.0, 0.5, 0.5), goal=(-2.0, -1.0, 1.0), clock="logical", iterations=1000,
+    ),
+    "endless": Scenario(
+        world="circles2d:n=12,seed=2,max_radius=4",
+        robot="chain:links=3,length=9,width=1,wrap=true",
+        start=(0.0, 0.5, 0.5), goal=(-2.0, -1.0, 1.0), clock="logical", iterations=1000,
+    ),
+}  # fmt: skip
+"""Runs of robots with bodies."""
+
+FREE = {"edges free", "paths free", "shortcuts"}
+LENGTHS = {"edge lengths", "edge costs"}
+
+
+@cache
+def body_evidence(name: str) -> Evidence:
+    """A clean run of a robot with a body."""
+    memory, run = Memory(), Run(BODIES[name])
+    run.execute([memory])
+    return Evidence(run.manifest, run.problem.world, memory.events(), None)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_clean_runs_of_bodies_have_no_findings(name: str) -> None:
+    """And there is something to find fault with: edges, rejections, a path."""
+    case = body_evidence(name)
+    assert case.broken() == set()
+    assert all(len(case.log[kind]) > 2 for kind in (Kind.EDGE, Kind.REJECT))
+    assert len(case.log[Kind.PATH])
+
+
+def body_hit(case: Evidence) -> Evidence:
+    """A tiny ball in the last part of the body, in the middle of a leaf's edge."""
+    row = leaf(case)
+    edges, robot = case.log[Kind.EDGE], case.manifest.make_robot().settled(case.world)
+    a, b = edges["q"][edges["parent"][row]], edges["q"][row]
+    return case.with_ball(robot.outline(robot.interpolate(a, b, 0.5))[-1].mean(axis=0))
+
+
+def posed(*numbers: float | None) -> Callable[[Evidence], Evidence]:
+    """A leaf elsewhere: numbers of its configuration that are not None."""
+
+    def edit(case: Evidence) -> Evidence:
+        q = case.log[Kind.EDGE]["q"][leaf(case)].copy()
+        for k, number in enumerate(numbers):
+            q[k] = q[k] if number is None else number
+        return doctored_edge(q=q)(case)
+
+    return edit
+
+
+def emptied(case: Evidence) -> Evidence:
+    """Without obstacles, so that only the bounds are in the way."""
+    return replace(case, world=replace(case.world, balls=np.empty((0, 3))))
+
+
+DOCTORED_BODIES: list[tuple[str, str, Callable[[Evidence], Evidence], str, set[str]]] = [
+    ("edges free", "polygon", body_hit, "hits ball", FREE),
+    ("edges free", "chain", body_hit, "hits ball", FREE),
+    ("edges free", "polygon", posed(None, 1.0), "hits", LENGTHS),
+    ("edges free", "polygon", lambda c: posed(1.0, 50.0, 0.0)(emptied(c)), "hits the bounds",
+     LENGTHS | {"rejections"}),
+    ("edges free", "chain", posed(0.0, 2.9, 2.9), "hits the robot itself", LENGTHS),
+    ("bounds", "polygon", posed(None, None, np.pi), "edge at", FREE | LENGTHS),
+    ("bounds", "polygon", posed(None, None, -4.0), "edge at", FREE | LENGTHS),
+    ("bounds", "chain", posed(None, 3.01), "edge at", FREE | LENGTHS),
+    ("bounds", "endless", posed(None, np.pi), "edge at", FREE | LENGTHS),
+    ("bounds", "endless", posed(3.2), "edge at", FREE | LENGTHS),
+    ("rejections", "polygon", lambda c: c.edit(
+        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0]), "is clear", set()),
+    ("rejections", "chain", lambda c: c.edit(
+        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0]), "is clear", set()),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rule", "name", "doctor", "message", "also"),
+    DOCTORED_BODIES,
+    ids=[f"{name} {rule} {i}" for i, (rule, name, *_) in enumerate(DOCTORED_BODIES)],
+)
+def test_doctored_bodies_are_found(
+    rule: str, name: str, doctor: Callable[[Evidence], Evidence], message: str, also: set[str]
+) -> None:
+    """As with points, for what only bodies can do."""
+    case = doctor(body_evidence(name))
+    found = check(case.manifest, case.world, case.log)
+    assert any(finding.rule == rule and message in finding.message for finding in found), found
+    assert {finding.rule for finding in found} <= {rule} | also
+
+
+@pytest.mark.parametrize("name", ["polygon", "chain"])
+@pytest.mark.parametrize("gap", [1e-7, 1e-4])
+def test_a_refusal_needs_a_reason(name: str, gap: float) -> None:
+    """What stays clear by 1e-7 of the map may be refused; what stays clear by 1e-4 may not."""
+    case = body_evidence(name)
+    robot = case.manifest.make_robot().settled(case.world)
+    q = case.log[Kind.EDGE]["q"][0]
+    part = robot.outline(q)[-1]
+    radius, corner = 1e-3, part[0]
+    out = corner - part.mean(axis=0)
+    centre = corner + out / np.hypot(*out) * (radius + gap * case.world.extent)
+    alone = replace(case.world, balls=np.array([[*centre, radius]]))
+    refused = np.array([[*q]])
+    from brrt.replay.checks.motions import Obstacles, all_clear, first_hits
+
+    assert all_clear(Obstacles(alone), robot, refused, refused).tolist() == [gap > 1e-5]
+    assert first_hits(Obstacles(alone), robot, refused, refused).tolist() == [-1]
+
+
+def test_what_verify_says_as_json(brrt: Callable[..., Result]) -> None:
+    """Names and types that programs may rely on; each rule stands there, examined or not."""
+    brrt("plan", "--world", "circles2d:n=5", "--out", "run.mcap")
+    done = brrt("verify", "run.mcap", "--json")
+    assert done.code == 0
+    shape = {"holds": bool, "planner_known": bool, "cut": bool, "events": int, "rules": list}
+    assert {name: type(value) for name, value in done.json.items()} == shape
+    assert done.json["holds"]
+    names = [rule.__name__.replace("_", " ") for rule in RULES]
+    assert [rule["rule"] for rule in done.json["rules"]] == names
+    for rule in done.json["rules"]:
+        assert {name: type(value) for name, value in rule.items()} == {
+            "rule": str, "promise": str, "examined": int, "broken": int, "findings": list,
+        }  # fmt: skip
+
+
+def test_what_verify_says_to_people(brrt: Callable[..., Result]) -> None:
+    """A line a rule, no longer than a terminal; --long writes the promises out."""
+    brrt("plan", "--world", "circles2d:n=5", "--out", "run.mcap")
+    done, long = brrt("verify", "run.mcap"), brrt("verify", "run.mcap", "--long")
+    assert done.code == long.code == 0
+    lines = done.out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert all("holds" in line for line in lines[:-1])
+    assert lines[-1] == f"all {len(lines) - 1} rules hold"
+    assert (RULES[0].__doc__ or "").partition("\n")[0] in long.out
+
+
+def test_broken_rules_come_first(brrt: Callable[..., Result], tmp_path: Path) -> None:
+    """With what they found, and exit code 1."""
+    case = evidence("rrt").edit(Kind.SAMPLE, 1, q=[-3.0, 5.0])
+    sink = McapSink(tmp_path / "bad.mcap", case.manifest, case.world)
+    sink.write(case.log)
+    sink.close(whole=True)
+    done = brrt("verify", tmp_path / "bad.mcap")
+    assert done.code == 1
+    assert "BROKEN" in done.out.splitlines()[0]
+    assert "sample at (-3, 5)" in done.out
+    assert done.out.splitlines()[-1].endswith(" broken")
+
+
+def test_a_cut_file_is_judged_as_far_as_it_goes(brrt: Callable[..., Result]) -> None:
+    """Without --partial it is refused; what is promised of the end is left out."""
+    brrt(
+        "plan", "--planner", "rrt-star", "--world", "circles2d:n=20", "--iterations", "20000",
+        "--no-smooth", "--out", "run.mcap",
+    )  # fmt: skip
+    whole = Path("run.mcap").read_bytes()
+    Path("cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    refused = brrt("verify", "cut.mcap")
+    assert refused.code == 2
+    assert "verify them with --partial" in refused.err
+    done = brrt("verify", "cut.mcap", "--partial", "--json")
+    assert done.code == 0
+    assert done.json["cut"]
+    assert done.json["events"] > 1000
+    assert brrt("verify", "run.mcap", "--partial", "--json").json["cut"] is False
 
 
 @pytest.mark.parametrize(
@@ -370,7 +564,7 @@ def test_every_rule_has_a_doctored_log() -> None:
     assert all((rule.__doc__ or "").strip() for rule in RULES)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_no_log_makes_a_check_fail(data: st.DataObject) -> None:
     """Whatever stands in a field, checks find or do not find; they never crash."""

@@ -48,8 +48,8 @@ def test_a_seed_fixes_everything(brrt: Command) -> None:
         assert brrt("plan", "--seed", seed, "--out", f"{name}.mcap").code == 0
     equal, parted = (brrt("replay", "a.mcap", "--check", f"{x}.mcap") for x in "bc")
     assert (equal.code, parted.code) == (0, 1)
-    assert "equal to b.mcap" in equal.out
-    assert "event 2 (sample): q (" in parted.out
+    assert "a.mcap (seed 7) and b.mcap (seed 7) are equal" in equal.out
+    assert "a.mcap (seed 7) and c.mcap (seed 8) part at event 2 (sample): q (" in parted.out
     assert brrt("replay", "a.mcap", "--check", "c.mcap", "--json").json["check"]["equal"] is False
 
 
@@ -64,6 +64,40 @@ def test_replay_at_an_instant(brrt: Command) -> None:
     assert brrt("replay", "a.mcap", "--at-iteration", 30, "--json").json["samples"] == 30
     assert brrt("replay", "a.mcap", "--at", "1h").code == 2
     assert brrt("replay", "a.mcap", "--at", "1s", "--at-event", 3).code == 2
+
+
+@pytest.mark.parametrize(
+    ("option", "beyond", "message"),
+    [
+        ("--at", "1s", "the recording ends at 0.00"),
+        ("--at-event", 10**9, "the recording ends with event "),
+        ("--at-iteration", 10**9, "the recording ends with iteration "),
+    ],
+)
+def test_replay_beyond_the_end(option: str, beyond: object, message: str, brrt: Command) -> None:
+    """The last instant is silent; after it there is a line on stderr, and the last figures."""
+    planned = brrt("plan", "--out", "a.mcap", "--clock", "logical", "--json").json
+    done = brrt("replay", "a.mcap", option, beyond, "--json")
+    assert (done.code, done.json) == (0, planned)
+    assert message in done.err
+    assert done.err.count("\n") == 1
+    last = planned["events"] - 1
+    for name, value in (("--at", f"{last}us"), ("--at-event", last),
+                        ("--at-iteration", planned["iterations"])):  # fmt: skip
+        end = brrt("replay", "a.mcap", name, value, "--json")
+        assert (end.json, end.err) == (planned, "")
+
+
+def test_iterations_as_people_write_them(brrt: Command) -> None:
+    """1e2 is a hundred."""
+    for text in ("1e2", "100", "100.0"):
+        done = brrt("plan", "--iterations", text, "--param", "goal_bias=0", "--param", "step=0.01",
+                    "--no-record", "--json")  # fmt: skip
+        assert done.json["iterations"] == 100
+    for text in ("1.5", "nan", "1e999", "many"):
+        done = brrt("plan", "--iterations", text, "--no-record")
+        assert done.code == 2
+        assert f"'{text}' is not a whole number" in done.err
 
 
 def test_replay_writes_rerun(brrt: Command) -> None:
@@ -266,3 +300,8 @@ def test_cache_folder_may_be_all_that_is_writable(tmp_path: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env
     )
     assert where.stdout.strip() == "None"
+    plan = [sys.executable, "-m", "brrt_cli", "plan", "--no-record", "--start", "-1,5"]
+    said = subprocess.run(plan, capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
+    assert "again in each run" in said.stderr
+    assert "BRRT_CACHE_DIR" in said.stderr
+    assert "once" not in said.stderr

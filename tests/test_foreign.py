@@ -61,9 +61,9 @@ def test_verify(brrt: Callable[..., Result], tmp_path: Path) -> None:
     good, bad = brrt("verify", "good.mcap"), brrt("verify", "bad.mcap")
     assert (good.code, bad.code) == (0, 1)
     assert "edges free" in good.out
-    assert "broken" not in good.out
+    assert "BROKEN" not in good.out
     assert f"event {edges['seq'][-1]:,} at " in bad.out
-    assert "edge costs: node" in bad.out
+    assert bad.out.startswith("edge costs ")
     data = brrt("verify", "bad.mcap", "--json").json
     assert data["holds"] is False
     assert [rule["rule"] for rule in data["rules"] if rule["broken"]] == ["edge costs"]

@@ -18,6 +18,7 @@ from brrt.kernels.kdtree import (
     grown_kdtree,
     has_room,
     insert,
+    near,
     nearest,
     rooted_kdtree,
 )
@@ -219,3 +220,126 @@ def test_points_that_come_in_order(dim: int, capacity: int) -> None:
     rng = np.random.default_rng(dim)
     check(tree, points, points[rng.integers(0, n, 30)])
     check(tree, points, rng.random((30, dim)) * n)
+
+
+@kernel
+def insert_each(
+    tree: KdTree, space: PointSpace, points: Floats, roots: NDArray[np.int64], first: int
+) -> int:
+    """Insert points into the trees that they belong to; return the first that is not in."""
+    n = first
+    while n < len(points) and has_room(tree):
+        insert(tree, space, points, n, roots[n])
+        n += 1
+    return n
+
+
+@kernel
+def nearest_in(tree: KdTree, space: PointSpace, queries: Floats, row: int, root: int) -> int:
+    """Find the node of one tree that is nearest to a query."""
+    return nearest(tree, space, queries, row, root)
+
+
+@kernel
+def near_in(
+    tree: KdTree,
+    space: PointSpace,
+    queries: Floats,
+    row: int,
+    root: int,
+    radius: float,
+    nodes: NDArray[np.int32],
+    far: Floats,
+) -> int:
+    """Find the nodes of one tree that are near a query."""
+    return near(tree, space, queries, row, root, radius, nodes, far)
+
+
+def planted_each(points: Floats, roots: NDArray[np.int64], capacity: int = 4) -> KdTree:
+    """Several trees in the same arrays; the first points are their roots."""
+    trees = int(roots.max()) + 1
+    tree = rooted_kdtree(points[:trees], capacity)
+    done = trees
+    while done < len(points):
+        done = insert_each(tree, space_of(points.shape[1]), points, roots, done)
+        if done < len(points):
+            capacity = 2 * max(capacity, trees)
+            tree = grown_kdtree(tree, capacity)
+    return tree
+
+
+def check_near(
+    tree: KdTree, points: Floats, roots: NDArray[np.int64], queries: Floats, radii: Floats
+) -> None:
+    """Hold what is near in each tree, and how far, to brute force."""
+    space, nodes = space_of(points.shape[1]), np.empty(len(points), np.int32)
+    far = np.empty(len(points))
+    for row, query in enumerate(queries):
+        distances = np.sqrt(naive.squared_distances(points, query))
+        for root in range(int(roots.max()) + 1):
+            mine = np.flatnonzero(roots == root)
+            closest = nearest_in(tree, space, queries, row, root)
+            assert roots[closest] == root
+            assert distances[closest] == distances[mine].min()
+            for radius in radii:
+                count = near_in(tree, space, queries, row, root, radius, nodes, far)
+                wanted = mine[distances[mine] <= radius]
+                assert sorted(nodes[:count].tolist()) == wanted.tolist()
+                assert (far[:count] == distances[nodes[:count]]).all()
+
+
+@DIMS
+@pytest.mark.parametrize("kind", [uniform, clustered, collinear])
+@pytest.mark.parametrize("trees", [1, 2, 5])
+@pytest.mark.parametrize("n", [5, BUCKET + 5, 600])
+def test_near_is_near_in_each_tree(dim: int, kind, trees: int, n: int) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Each tree finds its own nodes alone: all within the radius, none beyond, none twice."""
+    rng = np.random.default_rng(n + dim + trees)
+    points = np.unique(kind(rng, dim, n), axis=0)
+    rng.shuffle(points)
+    trees = min(trees, len(points))
+    roots = rng.integers(0, trees, len(points))
+    roots[:trees] = np.arange(trees)
+    queries = np.concatenate(
+        [points[rng.integers(0, len(points), 6)], rng.uniform(-1, 2, (6, dim))]
+    )
+    exact = np.sqrt(naive.squared_distances(points, queries[0]))[rng.integers(0, len(points), 2)]
+    radii = np.array([0.0, 1e-12, 0.01, 0.2, 1.0, 1e200, np.inf, *exact])
+    check_near(planted_each(points, roots), points, roots, queries, radii)
+
+
+@DIMS
+def test_trees_that_share_their_room_grow(dim: int) -> None:
+    """One tree grows far beyond the other, in order: its cells are rebuilt again and again."""
+    n = 3000
+    rng = np.random.default_rng(dim)
+    points = rng.random((n, dim)) + np.arange(n)[:, None] / 100
+    roots = (rng.random(n) < 0.02).astype(np.int64)
+    roots[:2] = 0, 1
+    queries = points[rng.integers(0, n, 20)] + rng.normal(size=(20, dim)) * 0.1
+    for capacity in (2, 10_000):
+        tree = planted_each(points, roots, capacity)
+        check_near(tree, points, roots, queries, np.array([0.0, 0.3, np.inf]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data(), st.sampled_from([2, 3]), st.integers(2, 60))
+def test_near_any_points(data: st.DataObject, dim: int, n: int) -> None:
+    """Equal and all but equal points: all within the radius, or 16 equal ones in their place."""
+    numbers = data.draw(st.lists(coordinate, min_size=dim, max_size=24))
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    points = rng.choice(numbers, (n, dim))
+    roots = rng.integers(0, 2, n)
+    roots[:2] = 0, 1
+    tree, space = planted_each(points, roots), space_of(dim)
+    nodes, far = np.empty(n, np.int32), np.empty(n)
+    for row, root in ((0, 0), (0, 1), (n - 1, 0), (n - 1, 1)):
+        distances = np.sqrt(naive.squared_distances(points, points[row]))
+        for radius in (0.0, 1.0, float(distances.max()), np.inf):
+            count = near_in(tree, space, points, row, root, radius, nodes, far)
+            listed = nodes[:count].tolist()
+            wanted = np.flatnonzero((roots == root) & (distances <= radius)).tolist()
+            assert len(set(listed)) == count
+            assert set(listed) <= set(wanted)
+            for node in set(wanted) - set(listed):
+                assert (points[listed] == points[node]).all(axis=1).sum() >= BUCKET

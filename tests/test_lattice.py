@@ -25,7 +25,7 @@ from brrt.kernels.space import segment_free
 from brrt.planners import AStar, LRTAStar, Planner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
-from brrt.robots import Point
+from brrt.robots import Point, Polygon
 from brrt.run import Run
 from brrt.scenario import Scenario
 from brrt.worlds import World, make_world
@@ -327,20 +327,14 @@ def test_walled_in(planner: AStar | LRTAStar) -> None:
         assert np.isfinite(events[Kind.HEURISTIC]["h"]).all()
 
 
-class Turtle:
-    """Some other robot."""
-
-    dof, space, collision = Point.dof, Point.space, Point.collision
-
-
 @pytest.mark.parametrize("planner", [LRTAStar(), AStar()])
 def test_refuses_what_it_cannot_plan_for(planner: AStar | LRTAStar) -> None:
     """Another robot, and cells that are too small, are refused in a line before any event."""
     world = World("empty", np.zeros(2), np.full(2, 10.0))
     ends = np.array([1.0, 1.0]), np.array([9.0, 9.0])
-    turtle: Any = Turtle()
+    poses = np.array([1.0, 1.0, 0.0]), np.array([9.0, 9.0, 0.0])
     with pytest.raises(BrrtError, match=r"move a point; use --robot point"):
-        planned(planner, Problem(world, turtle, *ends))
+        planned(planner, Problem(world, Polygon(length=0.5, width=0.5), *poses))
     with pytest.raises(BrrtError, match=r"epsilon 1e-09 is too small for this world"):
         planned(replace(planner, epsilon=1e-9), Problem(world, Point(), *ends))
 

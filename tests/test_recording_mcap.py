@@ -234,3 +234,11 @@ def test_background_raises_what_its_sink_raises() -> None:
     with pytest.raises(RecordingError, match="broken"):
         run.execute([Background(sink)])
     assert sink.closed
+
+
+def test_paths_may_be_texts(tmp_path: Path) -> None:
+    """As a user types them in a notebook."""
+    run, kept = Run(Scenario(world="circles2d", iterations=40)), Memory()
+    name = str(tmp_path / "a.mcap")
+    run.execute([McapSink(name, run.manifest, run.problem.world), kept])
+    assert len(read(name).events()) == len(kept.events())

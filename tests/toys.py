@@ -62,9 +62,9 @@ class Star:
             nearest = min(range(len(q)), key=lambda i: far(q[i], sample))
             length = far(q[nearest], sample)
             new = sample if length <= STEP else q[nearest] + STEP / length * (sample - q[nearest])
-            around = [
-                i for i in range(len(q)) if far(q[i], new) <= STEP and free(problem, q[i], new)
-            ]
+            # The nearest one counts where rounding puts the new node a hair beyond the step.
+            close = [i for i in range(len(q)) if i == nearest or far(q[i], new) <= STEP]
+            around = [i for i in close if free(problem, q[i], new)]
             if not around:
                 log.emit(
                     Kind.REJECT, iteration, tree=0, node=nearest, reason=Reason.COLLISION, q=new

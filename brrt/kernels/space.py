@@ -102,14 +102,20 @@ def steer(
     out: Floats,
     row: int,
 ) -> float:
-    """Move from A[i] towards B[j] by at most `step`, into out[row]; return how far."""
+    """Move from A[i] towards B[j] by at most `step`, into out[row]; return how far.
+
+    That is 0 where the step is lost in rounding; a tree that did not see it would grow on the spot.
+    """
     far = distance(space, A, i, B, j)
     if far <= step:
         for k in range(len(space.lower)):
             out[row, k] = B[j, k]
         return far
     interpolate(space, A, i, B, j, step / far, out, row)
-    return step
+    for k in range(len(space.lower)):
+        if out[row, k] != A[i, k]:
+            return step
+    return 0.0
 
 
 _INFORMED_DRAWS = 1000

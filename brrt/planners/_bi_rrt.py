@@ -16,7 +16,7 @@ from brrt.kernels.forest import Forest, add, emit_path, emit_roots, emit_solved,
 from brrt.kernels.jit import inlined, kernel
 from brrt.kernels.kdtree import nearest
 from brrt.kernels.random import Random, uniform
-from brrt.kernels.space import sample_uniform, segment_free, steer
+from brrt.kernels.space import distance, sample_uniform, segment_free, steer
 from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, POINTS, SOLVED, STATE_FULL
 
 Floats = NDArray[np.float64]
@@ -125,6 +125,9 @@ def advance(
     if counts[STAGE] == _BEGIN:
         emit_roots(forest, log)
         counts[STAGE] = _DRAW
+        if distance(space, forest.q, 0, forest.q, 1) <= options.step:
+            # Trees that are within reach from the beginning are joined without a draw.
+            counts[STAGE], counts[TREE], counts[FROM] = _LINK, 1, 1
     while True:
         if counts[STAGE] == _DONE:
             start, goal = counts[NEWEST], counts[NEWEST + 1]
@@ -152,7 +155,7 @@ def advance(
         for k in range(len(space.lower)):
             reached = reached and scratch[_NEW, k] == scratch[_TARGET, k]
         reason, more = -1, False
-        if far == 0.0 and not linking:
+        if far == 0.0 and not (linking and reached):
             reason = NO_PROGRESS
         elif not segment_free(space, forest.q, near, scratch, _NEW):
             reason = LINK_BLOCKED if linking and reached else COLLISION
@@ -175,4 +178,4 @@ def advance(
             counts[STAGE], counts[TREE], counts[FROM] = _LINK, 1 - tree, -1
         else:
             counts[STAGE] = _DRAW
-            counts[COUNTED] += 1
+            counts[COUNTED] = counts[DRAWS]

@@ -51,7 +51,8 @@ def shorten(
         iteration: The planner's count, for the events.
         attempts: Attempts to make in all.
     """
-    cost[0] = path_cost(path, counts[WAYPOINTS], space)
+    if counts[ATTEMPTS] == 0:
+        cost[0] = path_cost(path, counts[WAYPOINTS], space)
     while room(log) > 0 and counts[ATTEMPTS] < attempts and counts[WAYPOINTS] > 2:
         n = counts[WAYPOINTS]
         counts[ATTEMPTS] += 1

@@ -41,11 +41,11 @@ LINK_BLOCKED, NEAR_BLOCKED = int(Reason.LINK_BLOCKED), int(Reason.NEAR_BLOCKED)
 NO_GAIN = int(Reason.NO_GAIN)
 RAW, IMPROVED = int(Stage.RAW), int(Stage.IMPROVED)
 
-STAGE, TREE, TURN, GOAL_NODE, GOAL_NEAR, LINKS, SEEN, BEST, PATHS, NEWEST = range(OWN, OWN + 10)
+STAGE, TREE, TURN, GOAL_NODE, GOAL_NEAR, LINKS, BEST, PATHS, NEWEST = range(OWN, OWN + 9)
 """Places in `Star.counts`: what is under way, the tree that is being extended, the tree whose turn
 it is, the node at the goal or -1 (of one tree), whether the next sample is to be the goal because
-it is within reach, links between two trees, how far these have been looked through, the best of
-them or -1, paths so far, and from here on the newest node of each tree (two places)."""
+it is within reach, links between two trees, the best of them or -1, paths so far, and from here on
+the newest node of each tree (two places)."""
 COUNTS = NEWEST + 2
 
 _BEGIN, _DRAW, _GROW, _LINK, _TELL = range(5)
@@ -58,8 +58,8 @@ _TARGET, _NEW, _GOAL, _START = range(4)
 _UNKNOWN, _FREE, _BLOCKED = range(3)
 """What is known of the motion between the new node and one near it."""
 
-_LINKS_AT_ONCE = 8
-"""Links whose cost is looked at in each iteration: it falls when a tree is rewired below them."""
+_TOLD, _LEAST = range(2)
+"""Places in `Star.best`: the cost of the best path that was told, and of the best over any link."""
 
 
 class Options(NamedTuple):
@@ -85,9 +85,12 @@ class Star(NamedTuple):
         far: How far they are, shape (capacity,).
         known: What is known of the motions to them, shape (capacity,).
         stack: Nodes whose cost has changed, shape (capacity,).
-        links: Nodes of tree 0 and tree 1 that are linked, shape (capacity, 2).
+        links: For each link its node of tree 0 and of tree 1, and the next link at either node or
+            -1, shape (capacity, 4); with one tree there are none, nor the two that follow.
+        link_far: Length of each link, shape (capacity,).
+        linked: The last link at each node or -1, shape (capacity,).
         counts: See `drive` and above, shape (COUNTS,).
-        best: Cost of the best path, shape (1,).
+        best: See above, shape (2,).
         scratch: The target, the new node, goal and start, shape (4, dof).
     """
 
@@ -100,6 +103,8 @@ class Star(NamedTuple):
     known: NDArray[np.uint8]
     stack: Ints
     links: Ints
+    link_far: Floats
+    linked: Ints
     counts: NDArray[np.int64]
     best: Floats
     scratch: Floats
@@ -132,7 +137,7 @@ def draw(star: Star, space: Any, rng: Random, log: Buffer, options: Options) -> 
         for k in range(len(space.lower)):
             scratch[_TARGET, k] = scratch[_GOAL, k]
     elif source == INFORMED:
-        sample_informed(space, rng, scratch, _START, _GOAL, star.best[0], scratch, _TARGET)
+        sample_informed(space, rng, scratch, _START, _GOAL, star.best[_TOLD], scratch, _TARGET)
     else:
         sample_uniform(space, rng, scratch, _TARGET)
     emit(log, SAMPLE, counts[DRAWS], counts[TREE], source, 0, 0.0, scratch, _TARGET)
@@ -202,6 +207,20 @@ def leave(star: Star, node: int) -> None:
 
 
 @inlined
+def look_at_links(star: Star, node: int) -> None:
+    """See whether the links at a node have become the best, now that the node costs less."""
+    if len(star.linked) == 0:
+        return
+    cost, link = star.forest.cost, star.linked[node]
+    while link >= 0:
+        start, goal = star.links[link, 0], star.links[link, 1]
+        through = cost[start] + star.link_far[link] + cost[goal]
+        if through < star.best[_LEAST]:
+            star.best[_LEAST], star.counts[BEST] = through, link
+        link = star.links[link, 2 if start == node else 3]
+
+
+@inlined
 def settle(star: Star, node: int) -> None:
     """Let the costs below a node follow its own."""
     cost, top = star.forest.cost, 1
@@ -209,6 +228,7 @@ def settle(star: Star, node: int) -> None:
     while top > 0:
         top -= 1
         above = star.stack[top]
+        look_at_links(star, above)
         child = star.child[above]
         while child >= 0:
             cost[child] = cost[above] + star.edge[child]
@@ -255,7 +275,7 @@ def extend(star: Star, space: Any, log: Buffer, options: Options) -> int:
     if options.informed and counts[PATHS] > 0:
         there = distance(space, scratch, _START, scratch, _NEW)
         back = distance(space, scratch, _NEW, scratch, _GOAL)
-        if there + back >= star.best[0]:
+        if there + back >= star.best[_TOLD]:
             reject(star, log, tree, close, NO_GAIN, scratch, _NEW)
             return -1
     reach = radius(star, space, tree, options)
@@ -272,6 +292,8 @@ def extend(star: Star, space: Any, log: Buffer, options: Options) -> int:
     node = add(forest, space, log, counts[DRAWS], tree, parent, scratch, _NEW)
     star.edge[node] = distance(space, forest.q, parent, forest.q, node)
     star.child[node] = -1
+    if len(star.linked) > 0:
+        star.linked[node] = -1
     adopt(star, node, parent)
     rewire(star, space, log, tree, node, count)
     counts[NEWEST + tree] = node
@@ -292,41 +314,29 @@ def link(star: Star, space: Any, log: Buffer, options: Options) -> None:
     cost = forest.cost[start] + far + forest.cost[goal]
     mine, other = forest.number[start], forest.number[goal]
     emit(log, CONNECT, counts[DRAWS], mine, other, 0, cost, forest.q, start)
-    star.links[counts[LINKS], 0], star.links[counts[LINKS], 1] = start, goal
+    new = counts[LINKS]
+    star.links[new, 0], star.links[new, 2], star.linked[start] = start, star.linked[start], new
+    star.links[new, 1], star.links[new, 3], star.linked[goal] = goal, star.linked[goal], new
+    star.link_far[new] = far
     counts[LINKS] += 1
+    look_at_links(star, start)
 
 
 @inlined
-def path_cost(star: Star, space: Any) -> float:
-    """Return the cost of the best path as it stands.
-
-    Of the links the best so far, the newest, and a few of the others in turn are looked at.
-    """
-    forest, counts = star.forest, star.counts
-    if len(forest.nodes) == 2:
-        return float(forest.cost[counts[GOAL_NODE]]) if counts[GOAL_NODE] >= 0 else np.inf
-    links, best, least = counts[LINKS], counts[BEST], np.inf
-    for turn in range(min(links, _LINKS_AT_ONCE + 2)):
-        which = counts[SEEN]
-        if turn == 0 and best >= 0:
-            which = best
-        elif turn <= 1:
-            which = links - 1
-        else:
-            counts[SEEN] = which + 1 if which + 1 < links else 0
-        a, b = star.links[which, 0], star.links[which, 1]
-        cost = forest.cost[a] + distance(space, forest.q, a, forest.q, b) + forest.cost[b]
-        if cost < least:
-            counts[BEST], least = which, cost
-    return float(least)
+def path_cost(star: Star) -> float:
+    """Return the cost of the best path as it stands."""
+    if len(star.forest.nodes) > 2:
+        return float(star.best[_LEAST])
+    goal = star.counts[GOAL_NODE]
+    return float(star.forest.cost[goal]) if goal >= 0 else np.inf
 
 
 @inlined
-def tell(star: Star, space: Any, log: Buffer) -> bool:
+def tell(star: Star, log: Buffer) -> bool:
     """Say that there is a better path, if there is one; return whether the log had room for it."""
     forest, counts = star.forest, star.counts
-    cost = path_cost(star, space)
-    if cost >= star.best[0]:
+    cost = path_cost(star)
+    if cost >= star.best[_TOLD]:
         return True
     start, goal = counts[GOAL_NODE], -1
     if len(forest.nodes) > 2:
@@ -335,7 +345,7 @@ def tell(star: Star, space: Any, log: Buffer) -> bool:
     counts[POINTS] = emit_path(forest, log, counts[DRAWS], stage, cost, start, goal)
     if counts[POINTS] > 0:
         return False
-    star.best[0] = cost
+    star.best[_TOLD] = cost
     counts[PATHS] += 1
     return True
 
@@ -374,12 +384,14 @@ def advance(
     counts = star.counts
     if counts[STAGE] == _BEGIN:
         emit_roots(star.forest, log)
-        counts[STAGE] = _DRAW
+        if len(star.forest.nodes) > 2:
+            link(star, space, log, options)
+        counts[STAGE] = _TELL
     while True:
         if counts[STAGE] == _TELL:
-            if not tell(star, space, log):
+            if not tell(star, log):
                 return BATCH_FULL
-            counts[COUNTED] += 1
+            counts[COUNTED] = counts[DRAWS]
             counts[STAGE] = _DRAW
             if options.stop_at_first and counts[PATHS] > 0:
                 emit_solved(log, counts[DRAWS])

@@ -64,9 +64,9 @@ class BiRRT(Planner):
         return solve(options, problem, rng, log, stop)
 
 
-def step_length(step: float | None, problem: Problem) -> float:
-    """Return the step that was set, or 5 % of the map's longest side."""
-    return step or 0.05 * problem.world.extent
+def step_length(step: float | None, problem: Problem, part: float = 0.05) -> float:
+    """Return the step that was set, or a part of the map's longest side."""
+    return step or part * problem.world.extent
 
 
 def solve(

@@ -12,7 +12,7 @@ from brrt.planners import _star
 from brrt.planners.bi_rrt import step_length
 from brrt.planners.contract import Contract, Near
 from brrt.planners.planner import Planner
-from brrt.planners.rrt_star import proven_gamma, solve
+from brrt.planners.rrt_star import DEFAULT_STEP, proven_gamma, solve
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -30,7 +30,7 @@ class BiRRTStar(Planner):
     default_iterations: ClassVar[int] = 20_000
 
     step: float | None = param(
-        None, "longest edge; 5 % of the map's longest side by default", above=0
+        None, "longest edge; 20 % of the map's longest side by default", above=0
     )
     connect_distance: float | None = param(
         None, "longest link between the trees; the step by default", above=0
@@ -48,7 +48,7 @@ class BiRRTStar(Planner):
 
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
-        step = step_length(self.step, problem)
+        step = step_length(self.step, problem, DEFAULT_STEP)
         gamma = self.gamma or proven_gamma(problem)
         link = self.connect_distance or step
         return Contract(step=step, link=link, near=Near(gamma, step, problem.dof))
@@ -57,7 +57,7 @@ class BiRRTStar(Planner):
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
-        step = step_length(self.step, problem)
+        step = step_length(self.step, problem, DEFAULT_STEP)
         options = _star.Options(
             step=step,
             goal_bias=0.0,

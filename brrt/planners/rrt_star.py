@@ -19,6 +19,10 @@ from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
 
+DEFAULT_STEP = 0.2
+"""Part of the map's longest side: four times RRT's, because the step also bounds how far a node
+looks for parents, and with so few of them a tree improves slowly."""
+
 
 @dataclass(frozen=True, slots=True)
 class RRTStar(Planner):
@@ -32,7 +36,7 @@ class RRTStar(Planner):
     default_iterations: ClassVar[int] = 20_000
 
     step: float | None = param(
-        None, "longest edge; 5 % of the map's longest side by default", above=0
+        None, "longest edge; 20 % of the map's longest side by default", above=0
     )
     goal_bias: float = param(
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
@@ -50,7 +54,7 @@ class RRTStar(Planner):
 
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
-        step = step_length(self.step, problem)
+        step = step_length(self.step, problem, DEFAULT_STEP)
         gamma = self.gamma or proven_gamma(problem)
         return Contract(step=step, near=Near(gamma, step, problem.dof))
 
@@ -59,7 +63,7 @@ class RRTStar(Planner):
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
         options = _star.Options(
-            step=step_length(self.step, problem),
+            step=step_length(self.step, problem, DEFAULT_STEP),
             goal_bias=self.goal_bias,
             gamma=self.gamma or proven_gamma(problem),
             informed=self.informed,
@@ -108,25 +112,24 @@ def solve(
         far=np.empty(n),
         known=np.empty(n, np.uint8),
         stack=np.empty(n, np.int32),
-        links=np.empty((n if len(roots) > 1 else 0, 2), np.int32),
+        links=np.empty((n if len(roots) > 1 else 0, 4), np.int32),
+        link_far=np.empty(n if len(roots) > 1 else 0),
+        linked=np.empty(n if len(roots) > 1 else 0, np.int32),
         counts=counts,
-        best=np.array([np.inf]),
+        best=np.array([np.inf, np.inf]),
         scratch=np.array([problem.start, problem.start, problem.goal, problem.start]),
     )
     star.child[: len(roots)] = -1
     star.sibling[: len(roots)] = -1
+    star.linked[: len(roots)] = -1
     loop = Loop(_star.advance, star, options, _grown, 8, stop.iterations)
     return drive(loop, problem, rng, log, stop)
 
 
 def _grown(star: _star.Star) -> _star.Star:
     n, forest = int(star.forest.nodes[0]), grown_forest(star.forest)
-    capacity = len(forest.parent)
-    return star._replace(
-        forest=forest,
-        links=grown(star.links, int(star.counts[_star.LINKS]), capacity if len(star.links) else 0),
-        **{
-            name: grown(getattr(star, name), n, capacity)
-            for name in ("edge", "child", "sibling", "near", "far", "known", "stack")
-        },
-    )
+    names = ["edge", "child", "sibling", "near", "far", "known", "stack"]
+    # There are no more links than nodes.
+    names += ["links", "link_far", "linked"] if len(star.links) else []
+    larger = {name: grown(getattr(star, name), n, len(forest.parent)) for name in names}
+    return star._replace(forest=forest, **larger)

@@ -11,12 +11,13 @@ from brrt.recording.recording import Recording
 _RRD = b"RRF"
 
 
-def read(path: Path) -> Recording:
+def read(path: Path | str) -> Recording:
     """Open a recording, MCAP or Rerun, told apart by how the file begins.
 
     Raises:
         RecordingError: The file cannot be read, or is not a recording of brrt.
     """
+    path = Path(path)
     try:
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))

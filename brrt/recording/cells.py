@@ -33,7 +33,7 @@ class Cells:
 
     def __init__(self, canvas: Canvas, sketches: dict[int, Sketch], manifest: Manifest) -> None:
         self._canvas, self._sketches = canvas, sketches
-        settings = manifest.scenario.make_planner().as_dict()
+        settings = manifest.scenario.settings()
         self._edge, self._learns = float(settings.get("epsilon", 0.0)), "lookahead" in settings
         self._radius = self._edge * (_IN_PLANE if canvas.dim == 2 else _IN_SPACE)
         self._goal = np.array(manifest.goal)

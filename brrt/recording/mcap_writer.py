@@ -50,8 +50,8 @@ class McapSink:
         RecordingError: The file cannot be written.
     """
 
-    def __init__(self, path: Path, manifest: Manifest, world: World) -> None:
-        self._path, self._epoch = path, manifest.epoch_ns
+    def __init__(self, path: Path | str, manifest: Manifest, world: World) -> None:
+        self._path, self._epoch = Path(path), manifest.epoch_ns
         self._metrics = Metrics(manifest)
         self._layouts = {kind: Layout.parse(definition(kind, manifest.dof)) for kind in Kind}
         self._compressor = zstandard.ZstdCompressor(level=1)
@@ -60,7 +60,7 @@ class McapSink:
         self._position, self._crc = 0, 0
         self._index = _Summary(manifest.dof)
         try:
-            self._file = path.open("wb")
+            self._file = self._path.open("wb")
         except OSError as error:
             raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
         self._write(MAGIC)

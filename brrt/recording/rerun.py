@@ -52,11 +52,17 @@ class RerunSink:
     """
 
     def __init__(
-        self, manifest: Manifest, world: World, *, path: Path | None = None, view: bool = False
+        self,
+        manifest: Manifest,
+        world: World,
+        *,
+        path: Path | str | None = None,
+        view: bool = False,
     ) -> None:
         rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
         self._manifest, self._view = manifest, view
-        self._path, self._metrics = path, Metrics(manifest)
+        self._path = None if path is None else Path(path)
+        self._metrics = Metrics(manifest)
         self._layout = blueprint(manifest, world)
         self._rec: Any = rr.RecordingStream(
             APPLICATION, recording_id=recording_id(manifest), send_properties=False
@@ -64,7 +70,7 @@ class RerunSink:
         rr.set_log_time_enabled(False, recording=self._rec)
         if view:
             _open_viewer(self._rec)
-        self._drain = None if path is None else Drain(path)
+        self._drain = None if self._path is None else Drain(self._path)
         try:
             self._connect(blueprint(manifest, world, live=True) if view else self._layout)
             self._write_head(world)

@@ -205,7 +205,7 @@ def _fold(
     verdict: NDArray[np.uint8],
 ) -> None:
     """See `fold`; a question waits for its number of changes; from `parent` on it writes."""
-    born, question = 0, 0
+    born, question, rising = 0, 0, True
     for i in range(len(node)):
         question = _answer(question, i, moments, asked, answers, cost, born)
         v, p = node[i], new_parent[i]
@@ -222,12 +222,15 @@ def _fold(
             continue
         parent_cost[i] = cost[p]
         if not joins[i]:
-            if _descends(v, p, parent):
+            # Where no edge is shorter than 0, whatever is below a node costs no less than it.
+            above = rising and cost[p] < cost[v]
+            if not above and _descends(v, p, parent):
                 verdict[i] = CIRCLE
                 continue
             _leave(v, parent, links)
         _join(v, p, parent, links)
         lengths[v] = stated[i] - cost[p] if np.isnan(length[i]) else length[i]
+        rising = rising and lengths[v] >= 0.0
         cost[v] = cost[p] + lengths[v]
         at = _below(v, v, parent, links)
         while at >= 0:

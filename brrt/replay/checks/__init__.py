@@ -11,7 +11,7 @@ import numpy as np
 
 from brrt.events import Events
 from brrt.planners.contract import Contract
-from brrt.replay.checks import lattice, log, moves, paths, trees
+from brrt.replay.checks import lattice, log, moves, paths, rejects, trees
 from brrt.replay.checks.case import Case, Finding, Tally
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -19,12 +19,17 @@ from brrt.worlds.world import World
 Rule = Callable[[Case, Tally], None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *trees.RULES, *paths.RULES, *moves.RULES, *lattice.RULES,
+    *log.RULES, *trees.RULES, *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES,
 )  # fmt: skip
 
 
 def examine(
-    manifest: Manifest, world: World, events: Events, contract: Contract | None = None
+    manifest: Manifest,
+    world: World,
+    events: Events,
+    contract: Contract | None = None,
+    *,
+    cut: bool = False,
 ) -> list[Tally]:
     """Hold a run to all rules; return for each what it looked at and what it found.
 
@@ -36,11 +41,12 @@ def examine(
         events: The whole log.
         contract: What the planner promises; by default what the registered one of that name does,
             and of one that is not known here only what all planners do.
+        cut: Whether the log breaks off; what is promised of the end is then left out.
 
     Raises:
         BrrtError: The manifest's query is of no use in its world.
     """
-    case = Case.of(manifest, world, events, contract)
+    case = Case.of(manifest, world, events, contract, cut=cut)
     tallies = []
     # A doctored log may hold anything, so arithmetic on it may overflow; that is no news.
     with np.errstate(all="ignore"):

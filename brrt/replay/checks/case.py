@@ -132,6 +132,7 @@ class Case:
         upper: Greatest configuration, shape (dof,).
         contract: What the planner promises.
         known: Whether the planner is known here, so that there is a contract.
+        cut: Whether the log breaks off.
     """
 
     manifest: Manifest
@@ -144,10 +145,17 @@ class Case:
     upper: Floats
     contract: Contract
     known: bool
+    cut: bool = False
 
     @classmethod
     def of(
-        cls, manifest: Manifest, world: World, events: Events, contract: Contract | None = None
+        cls,
+        manifest: Manifest,
+        world: World,
+        events: Events,
+        contract: Contract | None = None,
+        *,
+        cut: bool = False,
     ) -> Self:
         """Open the case of a recording.
 
@@ -156,6 +164,7 @@ class Case:
             world: The run's.
             events: The whole log.
             contract: What the planner promises; by default what the registered one does.
+            cut: Whether the log breaks off.
 
         Raises:
             BrrtError: Its query is of no use in its world.
@@ -167,7 +176,7 @@ class Case:
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
             manifest, world, events, problem.robot, problem.start, problem.goal, *bounds,
-            contract or Contract(), contract is not None,
+            contract or Contract(), contract is not None, cut,
         )  # fmt: skip
 
     def distance(self, a: Floats, b: Floats) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import FIELDS, Events, Kind, Phase, Source, Status, Table
+from brrt.replay.checks.bodies import endless
 from brrt.replay.checks.case import Case, Tally
 
 _HEAD = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
@@ -61,7 +62,7 @@ def phases(case: Case, tally: Tally) -> None:
         if name not in set(Phase) or status not in set(Status):
             wrong = f"there is no phase {name} or no status {status}"
         tally.one(event, wrong)
-    if running is not None:
+    if running is not None and not case.cut:
         tally.one(None, f"{_phase(running)} does not end")
     first = case.events[Kind.PHASE][:1]
     opens = len(first) and first["name"][0] == Phase.PLAN and first["seq"][0] == 0
@@ -101,8 +102,9 @@ def outcome(case: Case, tally: Tally) -> None:
 
 
 def _with_path(case: Case) -> set[Status]:
-    """How planning may end where there is a path: who goes on improving it has a budget."""
-    if case.contract.near is None and case.known:
+    """How planning may end where there is a path: who improves it, or tries again, has a budget."""
+    trials = case.manifest.scenario.settings().get("trials", 1)
+    if case.contract.near is None and case.known and trials == 1:
         return {Status.SOLVED, Status.INTERRUPTED}
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
 
@@ -123,9 +125,13 @@ def budget(case: Case, tally: Tally) -> None:
 
 
 def bounds(case: Case, tally: Tally) -> None:
-    """Samples, nodes, cells, moves and waypoints lie within bounds and joint limits."""
-    slack = case.blur
+    """Samples, nodes, cells, moves and waypoints lie in bounds, joint limits and [-pi, pi).
+
+    The last is for angles that wrap: each configuration has one way of being written.
+    """
+    slack = np.where(endless(case.robot, case.events.dof), 0.0, case.blur)
     low, high = case.lower - slack, case.upper + slack
+    high = np.where(endless(case.robot, case.events.dof), np.nextafter(np.pi, 0), high)
     for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE):
         table = case.events[kind]
         q = np.asarray(table["q"])

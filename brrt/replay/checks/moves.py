@@ -91,7 +91,7 @@ def moves_free(case: Case, tally: Tally) -> None:
 def arrival(case: Case, tally: Tally) -> None:
     """Where the run is solved, the last move ends at the goal."""
     table = case.events[Kind.MOVE]
-    if len(table) and case.outcome is Status.SOLVED:
+    if len(table) and case.outcome is Status.SOLVED and not case.cut:
         there = (np.asarray(table["q"][-1]) == case.goal).all()
         wrong = f"the last move ends at {text(table['q'][-1])}, not at the goal"
         tally.one(table[-1], None if there else wrong)

@@ -30,8 +30,13 @@ def path_ends(case: Case, tally: Tally) -> None:
 
 def paths_free(case: Case, tally: Tally) -> None:
     """Every motion of every path is free of obstacles."""
-    for event, path in case.paths:
-        hit = case.blocked(path[:-1], path[1:])
+    ways = [path for _, path in case.paths]
+    if not ways:
+        return
+    starts = np.concatenate([path[:-1] for path in ways])
+    hits = case.blocked(starts, np.concatenate([path[1:] for path in ways]))
+    ends = np.cumsum([max(len(path) - 1, 0) for path in ways])
+    for (event, _), hit in zip(case.paths, np.split(hits, ends[:-1]), strict=True):
         bad = np.flatnonzero(hit >= 0)
         name = case.obstacles.name(int(hit[bad[0]])) if len(bad) else ""
         tally.one(event, f"motion {bad[0]} hits {name}" if len(bad) else None)

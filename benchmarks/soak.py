@@ -1,0 +1,106 @@
+"""Hold random runs of every planner, robot and world to their promises, and their recordings too.
+
+    python benchmarks/soak.py [--runs 3000] [--seed 0] [--folder soak]
+
+Run n is drawn from seed + n, so any of them can be drawn again: `--seed S --runs 1`. The checks are
+those of `brrt verify`, by code that is not the planners'. A finding is printed with the command
+that makes the run; the exit code is then 1. Robots and worlds that need a file are kept in the
+folder.
+"""
+
+import argparse
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from brrt import Memory, Run, Scenario
+from brrt.replay.checks import examine
+from tests.scenarios import LINKS, PLANNERS, ROBOTS, command, draw
+
+LINE = "{:14} {:10} {:>7} {:>7} {:>10} {:>9}"
+EVERY = 100
+
+
+def robot_of(run: Run) -> str:
+    """Name the column of a run."""
+    problem = run.problem
+    if problem.robot.kind == "point":
+        return f"point {problem.world.dim}D"
+    return f"chain {problem.dof}" if problem.robot.kind == "chain" else "polygon"
+
+
+def hold(scenario: Scenario, counts: dict[tuple[str, str], Counter[str]]) -> list[str]:
+    """Run a scenario and count what became of it; return what it breaks."""
+    run, log = Run(scenario), Memory()
+    metrics = run.execute([log])
+    events = log.events()
+    tallies = examine(run.manifest, run.problem.world, events)
+    # What a run promises holds of its log as far as it goes, wherever it is cut.
+    part = events.until(seq=scenario.seed % len(events))
+    halves = examine(run.manifest, run.problem.world, part, cut=True)
+    broken = [
+        f"{which}{tally.rule}: event {found.seq}: {found.message} ({tally.broken} such)"
+        for which, some in (("", tallies), (f"cut to {len(part)} events: ", halves))
+        for tally in some
+        for found in tally.findings[:1]
+    ]
+    count = counts.setdefault((scenario.planner, robot_of(run)), Counter())
+    count.update(runs=1, solved=metrics.as_dict()["solved"], events=len(events))
+    count.update(findings=sum(tally.broken for tally in [*tallies, *halves]))
+    return broken
+
+
+def main() -> int:
+    """Run them all; print a table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--runs", type=int, default=3000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--folder", type=Path, default=Path("soak"))
+    args = parser.parse_args()
+    args.folder.mkdir(parents=True, exist_ok=True)
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    began, bad = time.perf_counter(), 0
+    for n in range(args.runs):
+        scenario = draw(args.seed + n, args.folder)
+        try:
+            broken = hold(scenario, counts)
+        except Exception as error:  # noqa: BLE001 - a crash is a finding like any other
+            broken = [f"{type(error).__name__}: {error}"]
+        if broken:
+            bad += 1
+            print(f"\n--seed {args.seed + n}: {command(scenario)}")
+            print("\n".join(f"  {line}" for line in broken), flush=True)
+        if n % EVERY == EVERY - 1:
+            took = time.perf_counter() - began
+            print(f"{n + 1:,} runs in {took:.0f} s, {bad} with findings", flush=True)
+    show(counts)
+    print(f"{args.runs:,} runs, {bad} with findings; links: {', '.join(map(str, LINKS))}")
+    return int(bad > 0)
+
+
+def show(counts: dict[tuple[str, str], Counter[str]]) -> None:
+    """Print a line for each planner with each robot."""
+    print(LINE.format("planner", "robot", "runs", "solved", "events", "findings"))
+    total: Counter[str] = Counter()
+    for planner in PLANNERS:
+        for robot in ROBOTS:
+            if (planner, robot) in counts:
+                count = counts[planner, robot]
+                total += count
+                show_line(planner, robot, count)
+    show_line("all", "", total)
+
+
+def show_line(planner: str, robot: str, count: Counter[str]) -> None:
+    """Print a line."""
+    figures = [f"{count[name]:,}" for name in ("runs", "solved", "events", "findings")]
+    print(LINE.format(planner, robot, *figures))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

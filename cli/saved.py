@@ -1,0 +1,41 @@
+"""The events of a recording, of one that was cut as far as they are whole."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from .console import note
+
+if TYPE_CHECKING:
+    from brrt.events import Events
+    from brrt.recording import Recording
+
+
+class Saved:
+    """Yields a recording's batches; where the file is cut, says what was saved.
+
+    Args:
+        recording: The recording.
+        partial: Whether the user takes what is whole of a file that was cut.
+        verb: What the command does with it.
+    """
+
+    def __init__(self, recording: "Recording", *, partial: bool, verb: str) -> None:
+        self._recording, self._partial, self._verb = recording, partial, verb
+        self.cut = False
+
+    def __iter__(self) -> "Iterator[Events]":
+        from brrt.errors import RecordingError  # noqa: PLC0415 - keep --help fast
+        from brrt.recording import CutError  # noqa: PLC0415
+
+        events, last = 0, 0
+        try:
+            for batch in self._recording.batches():
+                events += len(batch)
+                last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
+                yield batch
+        except CutError as error:
+            saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
+            if not self._partial:
+                raise RecordingError(f"{error}; {saved}: {self._verb} with --partial") from None
+            self.cut = True
+            note(f"{error}; {saved}")
