@@ -19,6 +19,8 @@ Point = Sequence[float] | Floats
 
 NEAR = 1e-9
 """A hit that is none must be a miss by less than this part of the lengths at hand."""
+TINY = 1e-150
+"""The squares of lengths below this are lost to underflow."""
 
 
 def exact(values: Point) -> list[Fraction]:
@@ -97,11 +99,12 @@ def nearly_hits(world: World, a: Point, b: Point) -> bool:
     """
     d, ends = world.dim, np.array([a, b], dtype=np.float64)
     for box in world.boxes:
-        if segment_hits_box(a, b, box, NEAR * np.ptp([*ends, box[:d], box[d:]], axis=0).max()):
+        margin = NEAR * np.ptp([*ends, box[:d], box[d:]], axis=0).max() + TINY
+        if segment_hits_box(a, b, box, margin):
             return True
     for ball in world.balls:
         around = [*ends, ball[:d] - ball[d], ball[:d] + ball[d]]
-        if segment_hits_ball(a, b, ball, NEAR * np.ptp(around, axis=0).max()):
+        if segment_hits_ball(a, b, ball, NEAR * np.ptp(around, axis=0).max() + TINY):
             return True
     for polygon in world.polygons:
         near = NEAR * np.ptp([*ends, *polygon], axis=0).max()
