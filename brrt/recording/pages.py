@@ -6,7 +6,7 @@ wherever the cursor goes. What that costs is bounded in three ways:
 - There are at most `_MOST_PAGES`: when they are full, each takes twice as many items.
 - Changed pages are logged when `_PER_CHANGE` items a change have been saved up for the ones logged
   before, and, once there have been many changes, a fraction of that. So the rows stay in proportion
-  to the events, and the picture lags behind by about 1 % of what it shows; less at first.
+  to the events, and the picture lags behind by 3 % or so of its changes; by none at first.
 - The rows of a page are sent together, at most some times a second: a chunk takes a kilobyte and
   a quarter of a millisecond, and within one compression finds that the rows hardly differ.
 """
@@ -26,6 +26,9 @@ _MOST_PAGES, _FIRST_SIZE = 128, 32
 
 _PER_CHANGE, _MANY_CHANGES, _PER_CHANGE_OF_MANY = 16, 100_000, 4
 """Items that may be logged for each change; and beyond so many changes."""
+
+_MOST_UNSEEN = 1000
+"""Changes so far for each one that waits in any case: taking rows costs time, however small."""
 
 _SEND_S = 0.5
 """Seconds for which rows are gathered."""
@@ -122,7 +125,7 @@ class Pages:
             cost += len(content)
         self._dirty[:] = False
         per_change = _PER_CHANGE if self._changes < _MANY_CHANGES else _PER_CHANGE_OF_MANY
-        self._wait = max(1, cost // per_change)
+        self._wait = max(1, cost // per_change, self._changes // _MOST_UNSEEN)
 
     def _send(self) -> None:
         for page, (times, contents) in self._rows.items():
