@@ -63,10 +63,10 @@ def print_summary(figures: Mapping[str, Any]) -> None:
 
 def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "run", f"{f['planner']} · {f['robot']} · {f['world']} · seed {f['seed']}"
-    yield "outcome", ("solved" if f["solved"] else f"not solved, {f['status']}")
+    yield "outcome", _outcome(f)
     time = "" if f["plan_time_s"] is None else f" in {seconds(f['plan_time_s'])}"
     yield "planned", f"{f['iterations']:,} iterations{time}"
-    yield "events", f"{f['events']:,}: {', '.join(_counts(f))}"
+    yield "events", ": ".join(filter(None, [f"{f['events']:,}", ", ".join(_counts(f))]))
     if f["path"] is not None:
         first = ""
         if f["first_path_cost"] != f["path_cost"]:
@@ -88,6 +88,15 @@ def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         if f["deadline_misses"]:
             charged = f"a classic run charges {f['charged_moves']:,} moves"
             yield "", f"the robot stayed for {f['stays']:,} deadlines; {charged}"
+
+
+def _outcome(f: Mapping[str, Any]) -> str:
+    """Say whether there is a path, and what ended the run if that was not the path."""
+    if f["solved"]:
+        return "solved" if f["status"] == "solved" else f"solved, ended by: {f['status']}"
+    if f["status"] == "no path":
+        return "not solved, no path on the lattice; smaller cells may have one (--param epsilon=)"
+    return f"not solved, {f['status']}"
 
 
 def _counts(f: Mapping[str, Any]) -> Iterator[str]:

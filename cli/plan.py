@@ -174,7 +174,7 @@ def plan(
         "clock": clock,
     }  # fmt: skip
     settings = _merged(scenario, given, param or [])
-    _warn_of_compiling()
+    _tell_of_compiling()
     with Watch(settings.iterations, "preparing the planner").running() as watch:
         run = Run(settings)
         watch.total = None if settings.time is not None else run.stop.iterations
@@ -218,16 +218,17 @@ def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> li
     return sinks
 
 
-def _warn_of_compiling() -> None:
-    from brrt.kernels.jit import CACHE_FOLDER, is_cold  # noqa: PLC0415
+def _tell_of_compiling() -> None:
+    from brrt.kernels.jit import CACHE_FOLDER, on_compiling  # noqa: PLC0415
 
     if CACHE_FOLDER is None:
         note(
             "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
             "written; name one in the variable BRRT_CACHE_DIR"
         )
-    elif is_cold():
-        note("compiling the planner for this machine, once (10 to 20 s)")
+        return
+    text = "compiling the planner for this robot, once on this machine (10 to 20 s)"
+    on_compiling(lambda: note(text))
 
 
 def _show(metrics: "Metrics", watch: Watch) -> None:

@@ -10,6 +10,7 @@ import numba
 import numpy as np
 from numba import types
 from numba.core import config as _config
+from numba.core import event
 from platformdirs import user_cache_path
 
 config: Any = _config
@@ -49,9 +50,22 @@ def _cache_folder() -> Path | None:
 CACHE_FOLDER = _cache_folder()
 
 
-def is_cold() -> bool:
-    """Whether nothing has been compiled here yet, so that the first run will take a while."""
-    return CACHE_FOLDER is None or not any(CACHE_FOLDER.rglob("*.nbi"))
+class _FirstCompilation(event.Listener):
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell: Callable[[], None] | None = tell
+
+    def on_start(self, event: Any) -> None:  # noqa: ARG002
+        tell, self._tell = self._tell, None
+        if tell is not None:
+            tell()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def on_compiling(tell: Callable[[], None]) -> None:
+    """Call `tell` once, as soon as something has to be compiled that is not kept from before."""
+    event.register("numba:compile", _FirstCompilation(tell))
 
 
 def kernel(fn: F) -> F:

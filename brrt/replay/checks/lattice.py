@@ -116,7 +116,7 @@ def expansions(case: Case, tally: Tally) -> None:
     cost = above["cost"] + case.distance(a, b)
     tally.look(
         some, ~case.same(some["cost"], cost),
-        lambda i: f"cell {some['cell'][i]} is said to cost {some['cost'][i]!r}, not {cost[i]!r}",
+        lambda i: f"cell {some['cell'][i]} costs {cost[i]:.12g}, not {some['cost'][i]:.12g}",
     )  # fmt: skip
     case.look_free(tally, some, a, b, "motion between cells")
 
@@ -147,7 +147,7 @@ def estimates(case: Case, tally: Tally) -> None:
     wrong = ~(h > before - case.blur)
     tally.look(
         table, wrong,
-        lambda i: f"cell {table['cell'][i]}: the estimate goes from {before[i]!r} to {h[i]!r}",
+        lambda i: f"cell {table['cell'][i]}: an estimate of {h[i]:.12g} after {before[i]:.12g}",
     )  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def estimates_admissible(case: Case, tally: Tally) -> None:
     some, limit = table[judged], most[judged]
     tally.look(
         some, ~case.at_most(np.asarray(some["h"]), limit),
-        lambda i: f"cell {some['cell'][i]}: {some['h'][i]!r}, but {limit[i]!r} leads to the goal",
+        lambda i: f"cell {some['cell'][i]}: {some['h'][i]:.12g}, but {limit[i]:.12g} is a way",
     )  # fmt: skip
 
 
@@ -297,7 +297,7 @@ class _Walk:
         }
         best, chosen = min(costs.values(), default=np.inf), costs.get(target, np.inf)
         if not self.case.at_most(np.asarray(chosen), best):
-            return f"a move of cost and estimate {chosen!r}; {best!r} was there"
+            return f"a move of cost and estimate {chosen:.12g}; {best:.12g} was there"
         return None
 
 

@@ -48,7 +48,7 @@ def move_costs(case: Case, tally: Tally) -> None:
     cost = np.where(first, 0.0, previous) + case.distance(before, q)
     tally.look(
         table, ~case.same(stated, cost),
-        lambda i: f"said to cost {stated[i]!r} so far; it costs {cost[i]!r}",
+        lambda i: f"said to cost {stated[i]:.12g} so far; it costs {cost[i]:.12g}",
     )  # fmt: skip
 
 

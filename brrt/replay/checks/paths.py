@@ -47,7 +47,7 @@ def path_costs(case: Case, tally: Tally) -> None:
     for event, path in case.paths:
         length, stated = case.distance(path[:-1], path[1:]).sum(), float(event["cost"])
         right = bool(case.same(np.asarray(stated), np.asarray(length)))
-        said = f"said to cost {stated!r}; it is {float(length)!r} long"
+        said = f"said to cost {stated:.12g}; it is {length:.12g} long"
         tally.one(event, None if right else said)
 
 
@@ -57,7 +57,7 @@ def paths_improve(case: Case, tally: Tally) -> None:
     for event, _ in case.found:
         cost = float(event["cost"])
         if before is not None and event["stage"] == Stage.IMPROVED:
-            tally.one(event, None if cost < before else f"cost {cost!r} after {before!r}")
+            tally.one(event, None if cost < before else f"cost {cost:.12g} after {before:.12g}")
         before = cost
 
 
@@ -161,9 +161,9 @@ def _attempt(case: Case, event: Any, path: Floats, cost: float) -> tuple[str | N
     after = float(event["cost"])
     length = np.asarray(case.distance(path[:-1], path[1:]).sum())
     if not after <= cost * (1 + 1e-12):
-        return f"the cost rises from {cost!r} to {after!r}", path
+        return f"the cost rises from {cost:.12g} to {after:.12g}", path
     if not case.same(np.asarray(after), length):
-        return f"said to cost {after!r}; the path is {float(length)!r} long", path
+        return f"said to cost {after:.12g}; the path is {length:.12g} long", path
     return None, path
 
 
@@ -183,7 +183,7 @@ def smoothed(case: Case, tally: Tally) -> None:
         left = _shortened(raw[1], attempts)
         wrong = None if np.array_equal(left, path) else "not the path that the shortcuts leave"
         if not float(event["cost"]) <= raw[0] * (1 + 1e-12):
-            wrong = f"costs {float(event['cost'])!r}, more than {raw[0]!r} before"
+            wrong = f"costs {event['cost']:.12g}, more than {raw[0]:.12g} before"
         tally.one(event, wrong)
 
 

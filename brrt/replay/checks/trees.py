@@ -109,7 +109,7 @@ def _look_cost(case: Case, tally: Tally, table: Table, cost: Floats) -> None:
     stated = np.asarray(table["cost"])
     tally.look(
         table, ~case.same(stated, cost),
-        lambda i: f"node {table['node'][i]} is said to cost {stated[i]!r}; it costs {cost[i]!r}",
+        lambda i: f"node {table['node'][i]} costs {cost[i]:.12g}, not {stated[i]:.12g}",
     )  # fmt: skip
 
 
@@ -168,7 +168,7 @@ def links(case: Case, tally: Tally) -> None:
         tally.look(sound, long, lambda i: f"link of {length[i]:.12g}; the limit is {limit:.12g}")
     tally.look(
         sound, ~case.same(np.asarray(sound["cost"]), cost),
-        lambda i: f"said to cost {sound['cost'][i]!r}; it costs {cost[i]!r}",
+        lambda i: f"said to cost {sound['cost'][i]:.12g}; it costs {cost[i]:.12g}",
     )  # fmt: skip
     case.look_free(tally, sound, a, b, "link")
 
