@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from brrt.errors import BrrtError, unknown
+from brrt.files import read_text
 from brrt.robots.chain import Chain
 from brrt.robots.point import Point
 from brrt.robots.polygon import Polygon
@@ -46,15 +47,7 @@ def load_robot(path: Path) -> Robot:
     Raises:
         BrrtError: The file cannot be read, or is not a robot.
     """
-    try:
-        size = path.stat().st_size
-        if size > _MAX_BYTES:
-            raise BrrtError(f"{path}: {size:,} bytes are too many; a robot has {_MAX_BYTES:,}")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise BrrtError(f"{path}: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise BrrtError(f"{path}: not a text file") from None
+    text = read_text(path, "a robot", _MAX_BYTES)
     try:
         return robot_from_json(text)
     except BrrtError as error:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
+from brrt.files import read_text
 from brrt.settings import pairs
 from brrt.worlds.blocks import load_blocks
 from brrt.worlds.generators import (
@@ -80,15 +81,7 @@ def load_world(path: Path) -> World:
     """
     if path.suffix not in LOADERS:
         raise BrrtError(f"{path}: not a world that brrt reads; it reads {', '.join(LOADERS)}")
-    try:
-        size = path.stat().st_size
-        if size > _MAX_BYTES:
-            raise BrrtError(f"{path}: {size:,} bytes are too many; a world has {_MAX_BYTES:,}")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise BrrtError(f"{path}: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise BrrtError(f"{path}: not a text file") from None
+    text = read_text(path, "a world", _MAX_BYTES)
     try:
         return LOADERS[path.suffix](path, text)
     except BrrtError as error:
