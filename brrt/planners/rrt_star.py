@@ -25,21 +25,13 @@ looks for parents, and with so few of them a tree improves slowly."""
 
 
 @dataclass(frozen=True, slots=True)
-class RRTStar(Planner):
-    """RRT* (Karaman and Frazzoli 2011): a tree whose paths come ever closer to the optimum.
-
-    Each new node chooses the parent over which it costs least from the nodes near it, and then
-    becomes the parent of those that it serves better. It goes on until the budget ends; each
-    better path is recorded.
-    """
+class StarPlanner(Planner):
+    """What RRT* has in common, with one tree and with two."""
 
     default_iterations: ClassVar[int] = 20_000
 
     step: float | None = param(
         None, "longest edge; 20 % of the map's longest side by default", above=0
-    )
-    goal_bias: float = param(
-        0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
     gamma: float | None = param(
         None,
@@ -54,22 +46,40 @@ class RRTStar(Planner):
 
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
-        step = step_length(self.step, problem, DEFAULT_STEP)
-        gamma = self.gamma or proven_gamma(problem)
-        return Contract(step=step, near=Near(gamma, step, problem.dof))
+        options = self.options(problem)
+        near = Near(options.gamma, options.step, problem.dof)
+        return Contract(step=options.step, link=options.link or None, near=near)
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
-        options = _star.Options(
+    def options(self, problem: Problem) -> _star.Options:
+        """Return what the loop needs, with lengths resolved for a problem."""
+        return _star.Options(
             step=step_length(self.step, problem, DEFAULT_STEP),
-            goal_bias=self.goal_bias,
+            goal_bias=0.0,
             gamma=self.gamma or proven_gamma(problem),
             informed=self.informed,
             stop_at_first=self.stop_at_first,
             link=0.0,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class RRTStar(StarPlanner):
+    """RRT* (Karaman and Frazzoli 2011): a tree whose paths come ever closer to the optimum.
+
+    Each new node chooses the parent over which it costs least from the nodes near it, and then
+    becomes the parent of those that it serves better. It goes on until the budget ends; each
+    better path is recorded.
+    """
+
+    goal_bias: float = param(
+        0.05, "probability of drawing the goal until there is a path", low=0, high=1
+    )
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+        options = self.options(problem)._replace(goal_bias=self.goal_bias)
         return solve(options, problem.start[None], problem, rng, log, stop)
 
 
