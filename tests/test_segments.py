@@ -145,12 +145,13 @@ def boxes(rng: np.random.Generator, dim: int, side: int) -> World:
 
 def polygons(rng: np.random.Generator, dim: int, side: int) -> World:
     """Convex polygons and line segments, in and around the map."""
-    hulls = []
-    for _ in range(some(rng)):
+    n, hulls = some(rng), list[Array]()
+    while len(hulls) < n:
         reach = rng.integers(1, 2 + side // 2)
         offsets = rng.integers(-reach, reach + 1, (rng.integers(2, 8), dim))
-        hulls.append(hull(rng.integers(-1, side + 2, dim) + offsets))
-    return world_of(dim, side, polygons=[corners for corners in hulls if len(corners) > 1])
+        corners = hull(rng.integers(-1, side + 2, dim) + offsets)
+        hulls += [corners] if len(corners) > 1 else []
+    return world_of(dim, side, polygons=hulls)
 
 
 def hull(points: Array) -> Array:
