@@ -17,13 +17,14 @@ import json
 import os
 import statistics
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt import World, make_robot, make_world
+from brrt import Grid, World, make_robot, make_world
 from brrt.kernels.jit import kernel
 from brrt.kernels.space import segment_free
 
@@ -36,11 +37,23 @@ LEAST = 1e-3
 
 @dataclass(frozen=True)
 class Row:
-    """What is measured: a world, and how long its segments get, as a part of the map's side."""
+    """What is measured.
+
+    Attributes:
+        title: What the table calls it.
+        spec: The world, or how it is drawn.
+        longest: How long its segments get, as a part of the map's side.
+        draw: Makes the world, where no generator does.
+    """
 
     title: str
     spec: str
     longest: float = 1.0
+    draw: Callable[[], World] | None = None
+
+    def world(self) -> World:
+        """Make the world."""
+        return make_world(self.spec) if self.draw is None else self.draw()
 
 
 def rows() -> list[Row]:
@@ -59,7 +72,31 @@ def rows() -> list[Row]:
         Row("50 circles", "circles2d:n=50"),
         Row("50 squares", "squares2d:n=50"),
         Row("50 polygons", "polygons2d:n=50"),
+        Row("512 x 512 cells at random", "noise, 1 % blocked", draw=lambda: noise(512, 0.01)),
+        Row("1024 x 1024 cells at random", "noise, 1 % blocked", draw=lambda: noise(1024, 0.01)),
+        Row("1024 x 1024 cells at random", "noise, 0.01 % blocked", draw=lambda: noise(1024, 1e-4)),
+        Row("512 x 512 cells of rooms", "rooms of 32 cells", draw=lambda: rooms(512)),
+        Row("1024 x 1024 cells of rooms", "rooms of 32 cells", draw=lambda: rooms(1024)),
     ]
+
+
+def noise(n: int, blocked: float) -> World:
+    """Make a map of n x n cells, each blocked or not at random."""
+    cells = np.random.default_rng(0).random((n, n)) < blocked
+    return World.of_grid("noise", Grid(cells, np.zeros(2), 1.0))
+
+
+def rooms(n: int, side: int = 32, door: int = 6) -> World:
+    """Make a map of n x n cells: square rooms with a door to each neighbour."""
+    rng, cells = np.random.default_rng(0), np.zeros((n, n), np.bool_)
+    for walls in (cells, cells.T):
+        walls[::side] = True
+        for corner in np.ndindex(n // side, n // side):
+            row, first = np.array(corner) * side
+            place = first + rng.integers(1, side - door)
+            walls[row, place : place + door] = row == 0
+    cells[-1] = cells[:, -1] = True
+    return World.of_grid("rooms", Grid(cells, np.zeros(2), 1.0))
 
 
 @kernel
@@ -89,7 +126,7 @@ class Course:
 
     def __init__(self, row: Row, n: int) -> None:
         self.row = row
-        self.world = make_world(row.spec)
+        self.world = row.world()
         self.space: Any = make_robot("point").space(self.world)
         self.A, self.B = segments(self.world, n, row.longest)
         self.free = np.zeros(n, np.bool_)
@@ -104,8 +141,11 @@ class Course:
 
     def figures(self) -> dict[str, Any]:
         """Return what the rounds came to."""
-        grid = self.space.obstacles
-        cells = [((P - grid.lower) * grid.per_length).astype(int) for P in (self.A, self.B)]
+        grid, map_ = self.space.obstacles, self.world.grid
+        cells = [
+            np.floor((P - grid.lower) * grid.per_length if map_ is None else map_.to_cells(P))
+            for P in (self.A, self.B)
+        ]
         return {
             "world": self.row.title.strip(),
             "spec": self.row.spec,

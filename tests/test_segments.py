@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
 from brrt.kernels.jit import config, kernel
-from brrt.worlds import World
+from brrt.worlds import Grid, World
 
 from . import naive
 
@@ -30,8 +30,8 @@ WORLDS, SEGMENTS = 100, 500 if config.DISABLE_JIT else 10_000
 SIDES = (2, 5, 8, 16, LARGEST := 200)
 """Sides of the maps: the cells' borders lie on the lattice, or between its points."""
 
-SIXTHS = 60
-"""A side that is divided by 6 for the test in floats, so that nearly all coordinates round."""
+SIXTHS, SIXTH = 60, 1 / 6
+"""A side and a unit of length for the test in floats: nearly all coordinates round."""
 
 NEAR = 1e-8
 """Gaps beyond this are no rounding error of the twins in floats, in maps of side 10."""
@@ -154,6 +154,39 @@ def polygons(rng: np.random.Generator, dim: int, side: int) -> World:
     return world_of(dim, side, polygons=hulls)
 
 
+def cells(rng: np.random.Generator, dim: int, side: int) -> World:
+    """Blocked cells as boxes: any on small maps, else rectangles; around the map too, and one."""
+    edge = int(rng.choice([edge for edge in (1, 2, 4) if side % edge == 0]))
+    n = side // edge
+    if n <= 8:
+        lower = np.argwhere(rng.random((n + 2, n + 2)) < rng.choice([0.1, 0.3, 0.6])) - 1
+        upper = lower + 1
+    else:
+        lower = rng.integers(-1, n + 1, (some(rng), dim))
+        upper = np.minimum(lower + rng.integers(1, 2 + n // 4, lower.shape), n + 1)
+    blocked = np.hstack([lower, upper])
+    return world_of(dim, side, boxes=edge * np.vstack([blocked, [-1, -1, 0, 0]]))
+
+
+def painted(world: World, unit: float) -> World:
+    """The world as `scaled` returns it, a grid in place of boxes; cells as large as may be."""
+    borders = world.boxes.astype(np.int64)
+    edge = np.gcd.reduce(borders, axis=None)
+    n = int(world.extent) // edge + 2
+    taken = np.zeros((n, n), np.bool_)
+    for x0, y0, x1, y1 in borders // edge + 1:
+        taken[y0:y1, x0:x1] = True
+    grid = Grid(taken, np.full(2, -edge * unit), edge * unit)
+    return World("painted", world.lower, world.upper * unit, grid=grid)
+
+
+def scaled(world: World, unit: float) -> World:
+    """The world in another unit of length."""
+    hulls = tuple(corners * unit for corners in world.polygons)
+    balls, boxes = world.balls * unit, world.boxes * unit
+    return World("scaled", world.lower, world.upper * unit, balls, boxes, polygons=hulls)
+
+
 def hull(points: Array) -> Array:
     """Convex hull of points of a lattice: from left to right below, and back above."""
     rows = sorted({(int(x), int(y)) for x, y in points})
@@ -206,29 +239,32 @@ def segments(rng: np.random.Generator, world: World, n: int) -> tuple[Array, Arr
     return A, B
 
 
-def sixths(world: World) -> World:
-    """The world, divided by 6."""
-    shapes = {"balls": world.balls / 6, "boxes": world.boxes / 6}
-    hulls = [corners / 6 for corners in world.polygons]
-    return World("sixths", world.lower, world.upper / 6, **shapes, polygons=tuple(hulls))
-
-
 def floats(rng: np.random.Generator, lattice: World, n: int) -> tuple[Floats, Floats]:
     """Draw segments of all lengths in a map of a sixth; one in 50 is a sixth of the lattice's."""
-    a, b = rng.uniform(0, lattice.extent / 6, (2, n, lattice.dim))
+    a, b = rng.uniform(0, lattice.extent * SIXTH, (2, n, lattice.dim))
     b = a + (b - a) * 10 ** -rng.uniform(0, 4, (n, 1))
     c, d = segments(rng, lattice, max(20, n // 50))
-    return np.concatenate([a, c / 6]), np.concatenate([b, d / 6])
+    return np.concatenate([a, c * SIXTH]), np.concatenate([b, d * SIXTH])
 
 
 SHAPES = pytest.mark.parametrize(
-    ("draw", "dim"), [(balls, 2), (balls, 3), (boxes, 2), (boxes, 3), (polygons, 2)]
+    ("draw", "dim", "built"),
+    [
+        (balls, 2, scaled),
+        (balls, 3, scaled),
+        (boxes, 2, scaled),
+        (boxes, 3, scaled),
+        (polygons, 2, scaled),
+        (cells, 2, painted),
+    ],
+    ids=["balls2d", "balls3d", "boxes2d", "boxes3d", "polygons2d", "cells2d"],
 )
 Draw = Callable[[np.random.Generator, int, int], World]
+Built = Callable[[World, float], World]
 
 
 @SHAPES
-def test_a_million_segments_on_a_lattice(draw: Draw, dim: int) -> None:
+def test_a_million_segments_on_a_lattice(draw: Draw, dim: int, built: Built) -> None:
     """The kernel agrees exactly, both ways round; the million has enough of what is hard."""
     rng = np.random.default_rng(dim)
     seen = np.zeros(3)
@@ -237,7 +273,7 @@ def test_a_million_segments_on_a_lattice(draw: Draw, dim: int) -> None:
         a, b = segments(rng, world, SEGMENTS)
         gap = world_gap(world, a, b)
         for p, q in ((a, b), (b, a)):
-            wrong = compiled_hits(world, p, q) != (gap <= 0)
+            wrong = compiled_hits(built(world, 1.0), p, q) != (gap <= 0)
             assert not wrong.any(), f"wrong: {example(world, p, q, wrong)}"
         seen += np.bincount(np.sign(gap) + 1, minlength=3)
     within, grazing, free = seen / (WORLDS * SEGMENTS)
@@ -245,7 +281,7 @@ def test_a_million_segments_on_a_lattice(draw: Draw, dim: int) -> None:
 
 
 @SHAPES
-def test_segments_in_floats(draw: Draw, dim: int) -> None:
+def test_segments_in_floats(draw: Draw, dim: int, built: Built) -> None:
     """Twins in floats decide about all but the few whose gap may be rounding; fractions there.
 
     What touches is never called free, and what is called a hit at least nearly touches.
@@ -254,8 +290,8 @@ def test_segments_in_floats(draw: Draw, dim: int) -> None:
     close = 0
     for _ in range(WORLDS // 4):
         lattice = draw(rng, dim, SIXTHS)
-        world, (a, b) = sixths(lattice), floats(rng, lattice, SEGMENTS)
-        gap, said = world_gap(world, a, b), compiled_hits(world, a, b)
+        world, (a, b) = scaled(lattice, SIXTH), floats(rng, lattice, SEGMENTS)
+        gap, said = world_gap(world, a, b), compiled_hits(built(lattice, SIXTH), a, b)
         wrong = (said != (gap < 0)) & (abs(gap) > NEAR)
         assert not wrong.any(), f"wrong: {example(world, a, b, wrong)}"
         for i in np.flatnonzero(abs(gap) <= NEAR):
@@ -268,12 +304,13 @@ def test_segments_in_floats(draw: Draw, dim: int) -> None:
 
 
 @SHAPES
-def test_twins_against_fractions(draw: Draw, dim: int) -> None:
+def test_twins_against_fractions(draw: Draw, dim: int, built: Built) -> None:
     """The twins say what fractions say, wherever they say it by other formulas."""
     rng = np.random.default_rng(20 + dim)
     for side in SIDES:
         for _ in range(4):
             world = draw(rng, dim, side)
             a, b = segments(rng, world, 60)
-            touches = [naive.hits(world, p, q) for p, q in zip(a, b, strict=True)]
+            solid = built(world, 1.0).solid()
+            touches = [naive.hits(solid, p, q) for p, q in zip(a, b, strict=True)]
             assert ((world_gap(world, a, b) <= 0) == touches).all()
