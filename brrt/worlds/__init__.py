@@ -21,6 +21,7 @@ from brrt.worlds.generators import (
     Squares2D,
 )
 from brrt.worlds.movingai import load_grid
+from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
 GENERATORS: Mapping[str, type[Generator]] = {
@@ -95,4 +96,4 @@ def _named(name: str, world: World) -> World:
     return replace(world, name=name)
 
 
-__all__ = ["GENERATORS", "LOADERS", "Generator", "World", "load_world", "make_world"]
+__all__ = ["GENERATORS", "LOADERS", "Generator", "Grid", "World", "load_world", "make_world"]
