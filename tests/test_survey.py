@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.worlds import World, make_world
+from brrt.worlds.occupancy import Grid
 from brrt.worlds.raster import Lattice, components
 from brrt.worlds.shapes import shapes_of
 from brrt.worlds.survey import connected, covered, free_fraction
@@ -310,6 +312,35 @@ def _finer(world: World, start: Floats, goal: Floats) -> bool:
     label = components(~covered(world, points).reshape(steps))
     ends = [np.round(end / 10 * (np.array(steps) - 1)).astype(int) for end in (start, goal)]
     return bool(label[tuple(ends[0])] == label[tuple(ends[1])] >= 0)
+
+
+@settings(max_examples=80)
+@given(seeds, st.integers(1, 8), st.integers(1, 8), st.sampled_from([0.0, 0.5, 2.0]))
+def test_a_map_is_decided_on_its_own_cells(seed: int, rows: int, columns: int, yaw: float) -> None:
+    """Both answers are certain, on the border of two cells too; a lattice never contradicts."""
+    rng = np.random.default_rng(seed)
+    cells = rng.random((rows, columns)) < 0.4
+    grid = Grid(cells, np.array([3.0, -2]), 0.5, yaw)
+    world = World.of_grid("map", grid)
+    ends = [tuple(rng.integers(0, (rows, columns)).tolist()) for _ in range(2)]
+    places = grid.to_world((np.array(ends)[:, ::-1] + 0.5) * 0.5)
+    found = connected(world, places[0], places[1])
+    free = not (cells[ends[0]] or cells[ends[1]])
+    assert found.connected is (free and ends[1] in flooded(~cells, ends[0]))
+    assert free_fraction(replace(world, boxes=np.full((1, 4), 99.0)))[0] == pytest.approx(
+        free_fraction(world)[0], abs=0.01
+    )
+    solid = connected(world.solid(), places[0], places[1], cells=1 << 14)
+    assert solid.connected is not (not found.connected)
+
+
+def test_a_map_with_a_wall_is_searched_as_a_world() -> None:
+    """The grid's own cells are not all there is."""
+    world = World.of_grid("map", Grid(np.zeros((4, 4), bool), np.zeros(2), 1.0))
+    ends = np.array([0.5, 0.5]), np.array([3.5, 3.5])
+    assert connected(world, *ends).connected is True
+    walled = replace(world, polygons=(np.array([[0, 4], [4.0, 0]]),))
+    assert connected(walled, *ends).connected is None
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9])

@@ -158,7 +158,7 @@ class Polygons:
         local = points - self._origins[i]
         beyond = (local[owner] * self._normals[side]).sum(axis=1) - self._limits[side]
         slack = _SAFE * np.maximum(np.abs(local).max(axis=1), self._sizes[i])
-        return np.maximum.reduceat(beyond, np.flatnonzero(offset == 0)) <= slack
+        return np.asarray(np.maximum.reduceat(beyond, np.flatnonzero(offset == 0)) <= slack)
 
 
 def shapes_of(world: World) -> list[Shapes]:

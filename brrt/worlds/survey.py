@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brrt.worlds.occupancy import Grid
 from brrt.worlds.raster import Lattice, components, touches_box
 from brrt.worlds.shapes import Bools, Floats, Ints, Shapes, expanded, portions, shapes_of
 from brrt.worlds.world import World
@@ -51,8 +52,7 @@ def covered(world: World, points: Floats) -> Bools:
         Shape (n,).
     """
     points = np.ascontiguousarray(points, np.float64)
-    grid = getattr(world, "grid", None)
-    hit: Bools = np.zeros(len(points), np.bool_) if grid is None else grid.covers(points)
+    hit = np.zeros(len(points), np.bool_) if world.grid is None else world.grid.covers(points)
     for shapes in shapes_of(world):
         # Large ones first, few at a time: what they cover is not asked about again.
         order = np.argsort(-(shapes.high - shapes.low).prod(axis=1))
@@ -94,10 +94,15 @@ def free_fraction(world: World, seed: int = 0) -> tuple[float, float]:
         seed: Seed of the points.
 
     Returns:
-        The share, and the standard error of it. Where no cell's two points differ the error is
-        taken to be that of one point: something may have been missed.
+        The share, and the standard error of it: 0 where cells of a map, or nothing at all, could be
+        counted. Where no cell's two points differ it is taken to be that of one such cell:
+        something may have been missed.
     """
-    if not shapes_of(world) and getattr(world, "grid", None) is None:
+    grid = _map_alone(world)
+    if grid is not None:
+        area = grid.resolution**2 * float((~grid.cells).sum())
+        return min(area / float((world.upper - world.lower).prod()), 1.0), 0.0
+    if not shapes_of(world) and world.grid is None:
         return 1.0, 0.0
     lattice = Lattice.over(world.lower, world.upper, _STRATA)
     index = np.stack(np.unravel_index(np.arange(np.prod(lattice.shape)), lattice.shape), axis=1)
@@ -129,11 +134,32 @@ def connected(world: World, start: Floats, goal: Floats, cells: int = CELLS) -> 
         obstacle = world.obstacle_at(point)
         if obstacle is not None:
             return Connection(False, 0.0, f"the {name} touches {obstacle}")
-    return _search(world, np.array([start, goal], np.float64), cells)
+    ends, grid = np.array([start, goal], np.float64), _map_alone(world)
+    return _search(world, ends, cells) if grid is None else _search_map(grid, ends)
+
+
+def _map_alone(world: World) -> Grid | None:
+    """Return the grid of a world that is nothing but a grid, as far as the bounds reach."""
+    if world.grid is None or shapes_of(world):
+        return None
+    corners, slack = world.grid.corners, 1e-9 * world.extent
+    within = (world.lower - slack <= corners) & (corners <= world.upper + slack)
+    return world.grid if within.all() else None
+
+
+def _search_map(grid: Grid, ends: Floats) -> Connection:
+    """Look for a way through the sides of free cells: closed cells leave none through a corner."""
+    label = components(~grid.cells)
+    last = np.array(grid.cells.shape[::-1]) - 1
+    columns, rows = np.clip(np.floor(grid.to_cells(ends)), 0, last).astype(np.int64).T
+    one, other = label[rows, columns]
+    if one == other:
+        return Connection(True, grid.resolution, "the map's free cells lead to the goal")
+    return Connection(False, grid.resolution, "the map's free cells do not lead to the goal")
 
 
 def _search(world: World, ends: Floats, most: int) -> Connection:
-    obstacles, cells = shapes_of(world), min(_COARSEST, most)
+    obstacles, cells = shapes_of(world.solid()), min(_COARSEST, most)
     while True:
         lattice = Lattice.over(world.lower, world.upper, cells)
         free = ~lattice.blocked(obstacles)
