@@ -106,8 +106,8 @@ def test_good_json() -> None:
     [
         ({"schema": "other"}, 'the field "schema" must be "brrt.world"'),
         ({"schema": None}, 'the field "schema" must be "brrt.world"'),
-        ({"version": 2}, "world version 2 is not 1; update brrt"),
-        ({"version": None}, "world version None is not 1"),
+        ({"version": 3}, "world version 3 is not 1 or 2; update brrt"),
+        ({"version": None}, "world version None is not 1 or 2"),
         ({"lower": ...}, 'the field "lower" is missing'),
         ({"upper": ...}, 'the field "upper" is missing'),
         ({"lower": [0]}, "bounds must have 2 or 3 coordinates"),
@@ -136,6 +136,7 @@ def test_good_json() -> None:
         ({"boxes": [[3, 0, 2, 1]]}, "a box has a minimum above its maximum"),
         ({"boxes": [[0, 0, float("nan"), 1]]}, "boxes must hold finite numbers only"),
         ({"boxes": {"a": 1}}, "boxes must be rows of 4 numbers"),
+        ({"polygon": [[[0, 0], [1, 0]]]}, "unknown field of a world 'polygon'; did you mean"),
         ({"start": [1]}, "start must be"),
         ({"start": []}, "start must be"),
         ({"start": [1, 1, 2, 2]}, "start must be"),

@@ -43,6 +43,7 @@ from brrt.worlds.generators.walls import (
     Walls3D,
 )
 from brrt.worlds.movingai import load_grid
+from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
 GENERATORS: Mapping[str, type[Generator]] = {
@@ -139,4 +140,4 @@ def _named(name: str, world: World) -> World:
     return replace(world, name=name)
 
 
-__all__ = ["GENERATORS", "LOADERS", "Generator", "World", "load_world", "make_world"]
+__all__ = ["GENERATORS", "LOADERS", "Generator", "Grid", "World", "load_world", "make_world"]

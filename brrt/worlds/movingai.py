@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
 FREE, BLOCKED = ".GS", "@OTW"
@@ -21,7 +21,6 @@ def parse_grid(name: str, text: str) -> World:
     """Read a header (`type octile`, `height H`, `width W`, `map`) and H rows of W characters.
 
     Coordinates are the file's: x to the right, y down; cell (i, j) is [i, i + 1] x [j, j + 1].
-    Blocked cells that lie together become one box where they can.
 
     Args:
         name: Name of the world, and of the file in messages.
@@ -50,8 +49,7 @@ def parse_grid(name: str, text: str) -> World:
             )
     codes = np.frombuffer("".join(rows).encode(), np.uint8).reshape(height, width)
     cells = np.isin(codes, np.frombuffer(BLOCKED.encode(), np.uint8))
-    upper = np.array([width, height], np.float64)
-    return World(name, np.zeros(2), upper, boxes=rectangles(cells))
+    return World.of_grid(name, Grid(cells, np.zeros(2), 1.0))
 
 
 def _header(name: str, lines: list[str]) -> tuple[int, int]:
@@ -81,27 +79,6 @@ def _size(where: str, word: str, value: str) -> int:
             f"{where}: {word} must be a whole number from 1 to {_LONGEST:,}, not {value[:40]!r}"
         )
     return int(value)
-
-
-def rectangles(cells: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Cover the blocked cells, shape (rows, columns), by boxes that do not overlap.
-
-    Each run of a row is one with the runs of the same ends right below it.
-
-    Returns:
-        Least and greatest corner of each box, x before y, shape (n, 4).
-    """
-    boxes: list[tuple[int, int, int, int]] = []
-    open_since: dict[tuple[int, int], int] = {}
-    edged = np.pad(cells, ((0, 1), (1, 1)))
-    for y, row in enumerate(edged):
-        ends = np.flatnonzero(row[1:] != row[:-1]).tolist()
-        runs = set(zip(ends[::2], ends[1::2], strict=True))
-        ended = [run for run in open_since if run not in runs]
-        boxes += [(low, open_since.pop((low, high)), high, y) for low, high in ended]
-        for run in runs:
-            open_since.setdefault(run, y)
-    return np.array(sorted(boxes), np.float64).reshape(-1, 4)
 
 
 def load_grid(path: Path, text: str) -> World:
