@@ -362,7 +362,7 @@ def test_spaces_and_empty_parts_do_not_matter(name: str) -> None:
 def cell_graph(world: World, cells: int, side: float, wall: float) -> Pairs:
     """Neighbours with a way between them, as flat indices, shape (n, 2)."""
     places = np.argwhere(np.ones((cells,) * world.dim))
-    middles: Floats = side / 2 + places * (side + wall)
+    middles = np.asarray(side / 2 + places * (side + wall), np.float64)
     assert not covered(world, middles).any()
     pairs = []
     for axis in range(world.dim):

@@ -19,6 +19,7 @@ from brrt.worlds.generators.courses import (
     Tower3D,
     Window3D,
 )
+from brrt.worlds.generators.forests import Forest2D, Forest3D
 from brrt.worlds.generators.generator import Generator
 from brrt.worlds.generators.mazes import Maze2D, Maze3D, Rooms2D, Spiral2D
 from brrt.worlds.generators.scattered import (
@@ -53,6 +54,8 @@ GENERATORS: Mapping[str, type[Generator]] = {
     "polygons2d": Polygons2D,
     "boxes3d": Boxes3D,
     "spheres3d": Spheres3D,
+    "forest2d": Forest2D,
+    "forest3d": Forest3D,
     "maze2d": Maze2D,
     "maze3d": Maze3D,
     "rooms2d": Rooms2D,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import Settings, param
+from brrt.worlds.survey import connected
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,7 @@ class Scenery(NamedTuple):
     balls: Floats = np.empty((0, 0))
     boxes: Floats = np.empty((0, 0))
     polygons: tuple[Floats, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +101,23 @@ class Generator(Settings):
             for given, mine in zip((start, goal), own, strict=True)
         )
         lower, upper = np.zeros(self.dim), self.upper()
+        draws, reason = 0, ""
         try:
             for scenery in self.sceneries(Ends(start, goal, room)):
-                return World(name, lower, upper, start=start, goal=goal, **scenery._asdict())
+                world = World(name, lower, upper, start=start, goal=goal, **scenery._asdict())
+                if not self.connected:
+                    return world
+                found = connected(world, start, goal)
+                if found.connected:
+                    return world
+                draws, reason = draws + 1, found.reason
         except BrrtError as error:
             raise BrrtError(f"world {name}: {error}") from None
-        raise BrrtError(f"world {name}: no way")
+        where = f" in the last of {draws} draws" if draws > 1 else ""
+        raise BrrtError(
+            f"world {name}: not known to be connected ({reason}{where}); ask for fewer or smaller "
+            f"obstacles or wider openings, or give other ends"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Worlds drawn from a seed: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
 
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
+from brrt.worlds.generators.density import fewest
 from brrt.worlds.generators.generator import (
     CLEARANCE,
     Ends,
@@ -17,8 +19,14 @@ from brrt.worlds.generators.generator import (
     Seeded,
     no_fit,
 )
+from brrt.worlds.shapes import Shapes, shapes_of
+from brrt.worlds.world import World
 
 _REDRAWS = 1000
+_USUAL, _MOST = 50, 10_000_000
+_BATCHES = [256 << i for i in range(13)]
+"""Obstacles that are drawn at a time, the last number again and again, where a share of the map is
+asked for: the sequence does not depend on the share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +37,16 @@ class Scattered(Seeded):
     elsewhere. An obstacle that would cover one of them is drawn anew.
     """
 
-    n: int = param(50, "number of obstacles", low=0, high=10_000_000)
+    n: int = param(_USUAL, "number of obstacles", low=0, high=_MOST)
+    density: float | None = param(
+        None, "share of the map to cover, instead of a number; auto: as n says", low=0, high=1
+    )
+
+    def __post_init__(self) -> None:
+        """Check that one thing alone says how many obstacles there are."""
+        Seeded.__post_init__(self)
+        if self.density is not None and self.n != _USUAL:
+            raise BrrtError(f"n {self.n} and density {self.density:g} contradict; give one of them")
 
     @abstractmethod
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
@@ -46,8 +63,24 @@ class Scattered(Seeded):
         """Make obstacles of what was drawn."""
 
     def scenery(self, rng: np.random.Generator, ends: Ends, /) -> Scenery:
-        """Draw the obstacles."""
-        return self.place(*self._apart(rng, self.n, ends))
+        """Draw the obstacles: as many as asked for, or as it takes."""
+        if self.density is None:
+            return self.place(*self._apart(rng, self.n, ends))
+        drawn: list[tuple[Floats, Floats]] = []
+
+        def batches() -> Iterator[Shapes]:
+            count = 0
+            while count < _MOST:
+                n = min(_BATCHES[min(len(drawn), len(_BATCHES) - 1)], _MOST - count)
+                count += n
+                drawn.append(self._apart(rng, n, ends))
+                scenery = self.place(*drawn[-1])._asdict()
+                yield from shapes_of(World("", np.zeros(self.dim), self.upper(), **scenery))
+
+        count, share = fewest(self.density, self.upper(), batches())
+        centres, halves = (np.concatenate(parts)[:count] for parts in zip(*drawn, strict=True))
+        note = f"density {self.density:g} asked for: {count} obstacles cover {share:.4f} of the map"
+        return self.place(centres, halves)._replace(notes=(note,))
 
     def _apart(self, rng: np.random.Generator, n: int, ends: Ends) -> tuple[Floats, Floats]:
         """Draw n obstacles that keep off start and goal."""
