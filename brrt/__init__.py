@@ -20,7 +20,7 @@ from brrt.replay.metrics import Metrics
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
-from brrt.worlds import GENERATORS, World, make_world
+from brrt.worlds import GENERATORS, Grid, World, make_world
 
 __all__ = [
     "GENERATORS",
@@ -32,6 +32,7 @@ __all__ = [
     "Difference",
     "Events",
     "Finding",
+    "Grid",
     "Kind",
     "Manifest",
     "McapSink",

@@ -13,13 +13,14 @@ LONGEST_LINE = 10_000
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n?|\n|\Z)")
 
 
-def read_bytes(path: Path, what: str, most_bytes: int) -> bytes:
-    """Read a file, or the start of an endless one.
+def read_bytes(path: Path, what: str, most_bytes: int, *, rest: bool = True) -> bytes:
+    """Read a file, of whatever kind, into bounded memory.
 
     Args:
         path: The file.
         what: What it is to hold, for messages ("a world").
         most_bytes: A longer file is refused unread, an endless one once it is longer.
+        rest: Without it, the beginning of a longer file is returned.
 
     Raises:
         BrrtError: The file cannot be read, or is too long.
@@ -27,9 +28,9 @@ def read_bytes(path: Path, what: str, most_bytes: int) -> bytes:
     try:
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size
-            if size > most_bytes:
+            if size > most_bytes and rest:
                 raise BrrtError(f"{path}: {size:,} bytes are too many; {what} has {most_bytes:,}")
-            data = file.read(most_bytes + 1)
+            data = file.read(min(most_bytes, size or most_bytes) + rest)
     except (OSError, ValueError) as error:
         raise BrrtError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > most_bytes:

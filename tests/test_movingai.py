@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from brrt.errors import BrrtError
 from brrt.worlds import make_world
-from brrt.worlds.movingai import BLOCKED, FREE, parse_grid, rectangles
+from brrt.worlds.loaders.movingai import BLOCKED, FREE, parse_cells
 
 GRIDS = Path(__file__).parents[2] / "shared" / "worlds" / "movingai"
 HEAD = "type octile\nheight 2\nwidth 3\nmap\n"
@@ -18,36 +18,23 @@ HEAD = "type octile\nheight 2\nwidth 3\nmap\n"
 @given(
     st.integers(1, 12), st.integers(1, 12), st.integers(0, 2**32), st.sampled_from([0.2, 0.7, 1])
 )
-def test_boxes_are_the_blocked_cells(rows: int, columns: int, seed: int, part: float) -> None:
-    """Painted back, the boxes give the file's cells, and none is painted twice."""
+def test_cells_are_the_files(rows: int, columns: int, seed: int, part: float) -> None:
+    """Blocked characters are blocked cells, in the file's coordinates."""
     rng = np.random.default_rng(seed)
     cells = rng.random((rows, columns)) < part
     text = "\n".join(
         "".join(str(rng.choice(list(BLOCKED if cell else FREE))) for cell in row) for row in cells
     )
-    world = parse_grid("grid", f"type octile\nheight {rows}\nwidth {columns}\nmap\n{text}\n")
-    assert world.lower.tolist() == [0, 0]
-    assert world.upper.tolist() == [columns, rows]
-    painted = np.zeros((rows, columns), int)
-    for x0, y0, x1, y1 in world.boxes.astype(int):
-        painted[y0:y1, x0:x1] += 1
-    assert (painted == cells).all()
-    for y, x in np.ndindex(cells.shape):
-        assert (world.obstacle_at([x + 0.5, y + 0.5]) is not None) == cells[y, x]
-
-
-def test_runs_of_rows_are_merged() -> None:
-    """A block is one box, a frame four."""
-    assert rectangles(np.ones((300, 200), bool)).tolist() == [[0, 0, 200, 300]]
-    frame = np.ones((5, 6), bool)
-    frame[1:-1, 1:-1] = False
-    assert len(rectangles(frame)) == 4
+    text = f"type octile\nheight {rows}\nwidth {columns}\nmap\n{text}\n"
+    assert (parse_cells("grid", text.encode()) == cells).all()
 
 
 def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
     """As files from elsewhere do."""
-    world = parse_grid("grid", "type octile\r\nwidth 3\r\nheight 2\r\nmap\r\n.@.\r\n...\r\n\r\n")
-    assert world.boxes.tolist() == [[1, 0, 2, 1]]
+    for end in ("\n", "\r\n", "\r"):
+        text = end.join(["type octile", "width 3", "height 2", "map", ".@.", "...", "", ""])
+        cells = parse_cells("grid", text.encode())
+        assert cells.tolist() == [[False, True, False], [False, False, False]]
 
 
 @pytest.mark.parametrize(
@@ -74,7 +61,7 @@ def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
 def test_errors_say_where(text: str, message: str) -> None:
     """One line, with the number of the line at fault."""
     with pytest.raises(BrrtError) as error:
-        parse_grid("grid", text)
+        parse_cells("grid", text.encode())
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
 
@@ -86,4 +73,5 @@ def test_real_maps() -> None:
     for name, size in (("arena", (49, 49)), ("den312d", (65, 81)), ("maze-32-32-2", (32, 32))):
         world = make_world(str(GRIDS / f"{name}.map"))
         assert world.upper.tolist() == list(size)
-        assert len(world.boxes)
+        assert world.grid is not None
+        assert world.grid.cells.any()

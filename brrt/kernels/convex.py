@@ -145,6 +145,7 @@ def build_scenery(world: World, reach: float, joints: int = 1) -> Scenery:
         reach: Farthest that the body's points come from its reference point.
         joints: Rotations that follow each other from there to the last part.
     """
+    world = world.solid()
     grid: Obstacles = build_obstacles(world)
     hulls, radii = [ball[None, :2] for ball in world.balls], world.balls[:, 2].tolist()
     for a, b, c, d in world.boxes:

@@ -6,6 +6,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from brrt.kernels.cells import Cells, build_cells, segment_hits_cells
 from brrt.kernels.jit import BORROWING, borrowing, inlined
 from brrt.worlds.world import World
 
@@ -42,6 +43,7 @@ class Obstacles(NamedTuple):
         boxes: Least corner and greatest corner, shape (m, 2 d).
         vertices: Vertices of all polygons, counter-clockwise, shape (v, 2).
         corners: Where each polygon begins in `vertices`, and the end; shape (k + 1,).
+        cells: Occupancy grid of a 2D world.
     """
 
     lower: tuple[float, ...]
@@ -54,6 +56,7 @@ class Obstacles(NamedTuple):
     boxes: Floats
     vertices: Floats
     corners: NDArray[np.int32]
+    cells: Cells
 
 
 def bounding_boxes(world: World) -> tuple[Floats, Floats]:
@@ -105,6 +108,7 @@ def build_obstacles(world: World) -> Obstacles:
         world.boxes,
         vertices,
         ends,
+        build_cells(world),
     )
 
 
@@ -221,13 +225,31 @@ def _by_dimension(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types ar
     return never
 
 
+def _hits_cells(o: Obstacles, line: tuple[float, float, float, float]) -> bool:
+    """Whether the segment from (ax, ay) along (dx, dy) touches a cell of a 2D world's grid."""
+    ax, ay, dx, dy = line
+    return len(o.cells.clearance) > 0 and segment_hits_cells(o.cells, ax, ay, dx, dy)
+
+
+@overload(_hits_cells, strict=False, jit_options=BORROWING)  # type: ignore[arg-type]
+def _in_the_plane(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
+    """Compile the walk for 2D alone."""
+    if len(o.types[0]) == 2:
+        return _hits_cells
+
+    def never(o: Any, line: Any) -> bool:  # noqa: ARG001
+        return False
+
+    return never
+
+
 @inlined
 def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the closed segment from A[i] to B[j] touches an obstacle.
 
     Decided by formulas, not by sampling: slabs for boxes, the closest point for balls, separating
-    axes for polygons. Rounding
-    only ever turns a miss by less than about 1e-15 of the lengths at hand into a hit.
+    axes for polygons, a walk for the cells of an occupancy grid. Rounding only ever turns a miss
+    by less than about 1e-15 of the lengths at hand into a hit.
 
     Args:
         o: The obstacles, d axes.
@@ -258,6 +280,8 @@ def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
     next_x = _crossing(ox, dx, ix, wx, cx)
     next_y = _crossing(oy, dy, iy, wy, cy)
     next_z = _crossing(oz, dz, iz, wz, cz)
+    if _hits_cells(o, (ax, ay, dx, dy)):
+        return True
     while True:
         cell = cx + nx * (cy + ny * cz)
         for entry in range(o.starts[cell], o.starts[cell + 1]):

@@ -1,6 +1,6 @@
 """What a recording looks like in Rerun: colours, the still parts of the picture, the layout."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from brrt.events import Reason, Source, Stage
 from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
+from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
 Colour = tuple[int, int, int]
@@ -161,7 +162,22 @@ def _still_2d(world: World) -> dict[str, Any]:
         still["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
     if world.polygons:
         still["/world/obstacles/polygons"] = _filled_polygons(world.polygons)
+    if world.grid is not None:
+        still |= _still_cells(world.grid, world)
     return still
+
+
+def _still_cells(grid: Grid, world: World) -> Iterator[tuple[str, Any]]:
+    """Draw the cells as an image in a frame of its own, on one that is blocked all over."""
+    half = (world.upper - world.lower) / 2
+    outside = np.full((2, 2, 3), OBSTACLE, np.uint8)  # Rerun takes a single pixel for no image
+    yield "/world/outside", rr.Transform3D(translation=[*world.lower, 0], scale=[*half, 1])
+    yield "/world/outside/all", rr.Image(outside, color_model="RGB", draw_order=-2)
+    pixels = np.where(grid.cells[..., None], OBSTACLE, FREE).astype(np.uint8)
+    turn = rr.RotationAxisAngle([0, 0, 1], radians=grid.yaw)
+    frame = rr.Transform3D(translation=[*grid.origin, 0], rotation=turn, scale=grid.resolution)
+    yield "/world/obstacles/grid", frame
+    yield "/world/obstacles/grid/cells", rr.Image(pixels, color_model="RGB", draw_order=-1.5)
 
 
 def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:

@@ -3,17 +3,21 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.errors import BrrtError
+from brrt.errors import BrrtError, unknown
 from brrt.worlds.convex import GREATEST, convex_polygon, gap
+from brrt.worlds.occupancy import Grid
 
-SCHEMA, VERSION = "brrt.world", 1
+SCHEMA, VERSION, VERSION_WITH_GRID = "brrt.world", 1, 2
+"""A brrt that knows no grids must not read a world without its grid."""
+
+_SHAPES = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons", "grid")
 Floats = NDArray[np.float64]
 
 
@@ -69,6 +73,8 @@ class World:
         goal: Suggested goal position, shape (d,).
         polygons: Convex polygons, in 2D alone; vertices counter-clockwise, shape (k, 2) each. Two
             vertices make a line segment.
+        grid: Occupancy grid, in 2D alone.
+        notes: What the user should know of how the world came about; not saved.
 
     Raises:
         BrrtError: A shape is wrong, a number is not finite, or a minimum exceeds its maximum.
@@ -82,6 +88,21 @@ class World:
     start: Floats | None = None
     goal: Floats | None = None
     polygons: tuple[Floats, ...] = ()
+    grid: Grid | None = None
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of_grid(
+        cls,
+        name: str,
+        grid: Grid,
+        start: Floats | None = None,
+        goal: Floats | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> Self:
+        """Make a world of an occupancy grid alone, as large as the grid."""
+        lower, upper = grid.corners.min(axis=0), grid.corners.max(axis=0)
+        return cls(name, lower, upper, start=start, goal=goal, grid=grid, notes=notes)
 
     def __post_init__(self) -> None:
         """Bring the arrays to float64 and check them."""
@@ -97,12 +118,18 @@ class World:
         for name, width in (("balls", dim + 1), ("boxes", 2 * dim)):
             object.__setattr__(self, name, _rows(name, getattr(self, name), width))
         object.__setattr__(self, "polygons", _polygons(self.polygons, dim))
+        self._check_ranges(dim)
+
+    def _check_ranges(self, dim: int) -> None:
+        """See that what has two sides has them in order."""
         if not (self.lower < self.upper).all():
             raise BrrtError("world: each upper bound must be above its lower bound")
         if (self.boxes[:, :dim] > self.boxes[:, dim:]).any():
             raise BrrtError("world: a box has a minimum above its maximum")
         if (self.balls[:, dim] < 0).any():
             raise BrrtError("world: a radius is below zero")
+        if self.grid is not None and dim != 2:
+            raise BrrtError(f"world: a grid lies in the plane, and this world is {dim}D")
 
     @property
     def dim(self) -> int:
@@ -130,7 +157,11 @@ class World:
         for i, ball in enumerate(self.balls):
             if math.dist(ball[:d], p) <= ball[d]:
                 return f"ball {i} (centre {_numbers(ball[:d])}, radius {ball[d]:g})"
-        return self._polygon_at(p[None]) if d == 2 else None
+        if d == 3:
+            return None
+        if self.grid is not None and self.grid.covers(p[None]).any():
+            return f"the map's blocked cells at {_numbers(p)}"
+        return self._polygon_at(p[None])
 
     def obstacle_touching(self, shape: Floats) -> str | None:
         """Name the first obstacle of a 2D world that touches a shape, or return None.
@@ -151,7 +182,34 @@ class World:
             x, y, radius = self.balls[i]
             if gap(shape, np.array([[x, y]])) <= radius:
                 return f"ball {i} (centre {x:g}, {y:g}, radius {radius:g})"
+        if self.grid is not None and self._in_cells(self.grid.to_cells(shape)):
+            return f"the map's blocked cells about {_numbers(shape.mean(axis=0))}"
         return self._polygon_at(shape)
+
+    def _in_cells(self, shape: Floats) -> bool:
+        """Whether a shape touches blocked cells or leaves the grid; in columns and rows, (k, 2)."""
+        assert self.grid is not None  # noqa: S101 - the caller's
+        if self.grid.covers(self.grid.to_world(shape * self.grid.resolution)).any():
+            return True
+        least, most, taken = shape.min(axis=0), shape.max(axis=0), self.grid.rectangles
+        near = ((taken[:, :2] <= most) & (least <= taken[:, 2:])).all(axis=1)
+        return any(
+            gap(shape, np.array([[a, b], [c, b], [c, d], [a, d]], np.float64)) <= 0
+            for a, b, c, d in taken[near].tolist()
+        )
+
+    def solid(self) -> "World":
+        """Return the same world with boxes instead of its grid, polygons if that is turned."""
+        if self.grid is None:
+            return self
+        boxes, polygons = self.boxes, self.polygons
+        hulls = self.grid.hulls(self.grid.rectangles.astype(np.float64))
+        if self.grid.yaw == 0:
+            boxes = np.concatenate([boxes, hulls[:, 0::2].reshape(-1, 4)])
+        else:
+            polygons += tuple(hulls)
+        polygons += tuple(self.grid.outside(self.lower, self.upper))
+        return replace(self, boxes=boxes, polygons=polygons, grid=None)
 
     def _polygon_at(self, shape: Floats) -> str | None:
         least, most = shape.min(axis=0), shape.max(axis=0)
@@ -163,13 +221,16 @@ class World:
 
     def to_json(self) -> str:
         """Return the world as text that `from_json` reads back to the same numbers."""
-        data: dict[str, Any] = {"schema": SCHEMA, "version": VERSION, "name": self.name}
+        version = VERSION if self.grid is None else VERSION_WITH_GRID
+        data: dict[str, Any] = {"schema": SCHEMA, "version": version, "name": self.name}
         for name in ("lower", "upper", "start", "goal", "balls", "boxes"):
             value = getattr(self, name)
             if value is not None:
                 data[name] = value.tolist()
         if self.polygons:
             data["polygons"] = [polygon.tolist() for polygon in self.polygons]
+        if self.grid is not None:
+            data["grid"] = self.grid.as_json()
         return json.dumps(data)
 
     @classmethod
@@ -185,13 +246,21 @@ class World:
             raise BrrtError(f"not a JSON world: {error}") from None
         if not isinstance(data, dict) or data.get("schema") != SCHEMA:
             raise BrrtError(f'not a brrt world: the field "schema" must be "{SCHEMA}"')
-        if data.get("version") != VERSION:
-            raise BrrtError(f"world version {data.get('version')!r} is not {VERSION}; update brrt")
-        known = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons")
+        if data.get("version") not in (VERSION, VERSION_WITH_GRID):
+            raise BrrtError(
+                f"world version {data.get('version')!r} is not {VERSION} or {VERSION_WITH_GRID}; "
+                f"update brrt"
+            )
         for name in ("lower", "upper"):
             if name not in data:
                 raise BrrtError(f'not a whole brrt world: the field "{name}" is missing')
-        return cls(str(data.get("name", "")), **{k: data[k] for k in known if k in data})
+        for name in data:
+            if name not in (*_SHAPES, "schema", "version", "name"):
+                raise unknown("field of a world", name, _SHAPES)
+        found = {name: data[name] for name in _SHAPES if name in data}
+        if "grid" in found:
+            found["grid"] = Grid.from_json(found["grid"])
+        return cls(str(data.get("name", "")), **found)
 
     def save(self, path: Path) -> None:
         """Write the world as JSON."""

@@ -20,12 +20,16 @@ _GROUP, _GROUPS, _PAIRS, _CELLS = 64, 1024, 8192, 64
 
 
 class Obstacles:
-    """Boxes, balls and convex polygons under one numbering, with the boxes around them."""
+    """Boxes, balls and convex polygons under one numbering, with the boxes around them.
+
+    The blocked cells of an occupancy grid are among the boxes, or the polygons if it is turned.
+    """
 
     def __init__(self, world: World) -> None:
-        d = world.dim
+        d, self._own = world.dim, (len(world.boxes), len(world.balls), len(world.polygons))
+        world = world.solid()
         self.boxes, self.balls = world.boxes, world.balls
-        self.polygons = [np.asarray(p, np.float64) for p in getattr(world, "polygons", None) or ()]
+        self.polygons = [np.asarray(p, np.float64) for p in world.polygons]
         self.ends = np.cumsum([len(self.boxes), len(self.balls), len(self.polygons)])
         centre, radius = self.balls[:, :d], self.balls[:, d:]
         lower = [self.boxes[:, :d], centre - radius, *(p.min(axis=0)[None] for p in self.polygons)]
@@ -67,8 +71,10 @@ class Obstacles:
         if j >= len(self):
             return "the bounds" if j == self.bounds else "the robot itself"
         kind = int(np.searchsorted(self.ends, j, side="right"))
-        first = 0 if kind == 0 else int(self.ends[kind - 1])
-        return f"{('box', 'ball', 'polygon')[kind]} {j - first}"
+        number = j - (0 if kind == 0 else int(self.ends[kind - 1]))
+        if number >= self._own[kind]:
+            return "the map's blocked cells"
+        return f"{('box', 'ball', 'polygon')[kind]} {number}"
 
     def parts(self, i: Ints, j: Ints) -> Iterator[tuple[int, Ints, Ints]]:
         """Part pairs by the kind of their obstacle: 0 boxes, 1 balls, 2 polygons."""

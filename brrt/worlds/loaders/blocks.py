@@ -2,7 +2,7 @@
 
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.files import lines_of, read_text
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader, finite
+from brrt.worlds.loaders.loader import MOST_BYTES, Loader, finite, nothing_to_choose
 from brrt.worlds.world import World
 
 _CORNERS, _COLOUR = 6, 3
-_BEGINS = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:\s++|#[^\r\n]*+)*+(?:boundary|block)\b", re.IGNORECASE)
+_BEGINS = re.compile(
+    rb"\A(?:\xef\xbb\xbf)?(?:\s++|#[^\r\n]*+)*+(?:boundary|block)\b", re.IGNORECASE
+)
 
 _MOST_NOTES = 10
 """Blocks outside the boundary that are named one by one."""
@@ -42,6 +44,7 @@ class Blocks(Loader):
         Raises:
             BrrtError: A line is wrong, or there is not exactly one boundary.
         """
+        nothing_to_choose(path, query)
         return parse_blocks(str(path), read_text(path, "a world", MOST_BYTES))
 
 
@@ -104,11 +107,11 @@ def _outside(
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
     boxes: NDArray[np.float64],
-    lines: array[int],
+    lines: Sequence[int],
 ) -> Iterator[str]:
     """Say which blocks reach outside the boundary, where, and by how much."""
     beyond = np.maximum(lower - boxes[:, :3], boxes[:, 3:] - upper)
-    apart = ((boxes[:, 3:] < lower) | (upper < boxes[:, :3])).any(axis=1)
+    apart = np.any((boxes[:, 3:] < lower) | (upper < boxes[:, :3]), axis=1)
     outside = np.flatnonzero((beyond > 0).any(axis=1)).tolist()
     for i in outside[:_MOST_NOTES]:
         by = " and ".join(

@@ -14,11 +14,12 @@ from brrt.errors import BrrtError
 from brrt.files import read_text
 from brrt.settings import param
 from brrt.worlds.convex import GREATEST
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader
+from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 
+_MEMBERS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 _KINDS = ("FeatureCollection", "Feature", "GeometryCollection", "MultiPolygon", "Polygon")
 _BEGINS = re.compile(rf'"type"\s*:\s*"(?:{"|".join((*_KINDS, "Point"))})"'.encode())
 _ENDS = ("start", "goal")
@@ -72,6 +73,7 @@ class GeoJson(Loader):
         Raises:
             BrrtError: It is no GeoJSON, a polygon crosses itself, or shapely is not there.
         """
+        nothing_to_choose(path, query)
         try:
             data = json.loads(read_text(path, "a world", MOST_BYTES))
         except (ValueError, RecursionError) as error:
@@ -122,28 +124,31 @@ def _collect(found: _Found, path: str, where: str, data: Any, depth: int) -> Non
     if depth > _DEEPEST:
         raise BrrtError(f"{path}: collections are nested more than {_DEEPEST} deep")
     kind = data["type"]
-    for holder, name in (("FeatureCollection", "features"), ("GeometryCollection", "geometries")):
-        if kind == holder:
-            for i, member in enumerate(_list(f"{path}: {where}{name}", data.get(name))):
-                _collect(found, path, f"{where}{name}[{i}]: ", member, depth + 1)
-    if kind == "Feature":
-        end = _end(data)
-        geometry = data.get("geometry")
-        if end and isinstance(geometry, dict) and geometry.get("type") == "Point":
-            if end in found.ends:
-                raise BrrtError(f"{path}: {where}a second {end}")
-            spot = _positions(f"{path}: {where}{end}", [geometry.get("coordinates")], (2, 3, 4))
-            found.ends[end] = spot[0, :2]
-        elif geometry is not None:
-            _collect(found, path, where, geometry, depth + 1)
+    if kind in _MEMBERS:
+        name = _MEMBERS[kind]
+        for i, member in enumerate(_list(f"{path}: {where}{name}", data.get(name))):
+            _collect(found, path, f"{where}{name}[{i}]: ", member, depth + 1)
+    elif kind == "Feature":
+        _feature(found, path, where, data, depth)
     elif kind in ("Polygon", "MultiPolygon"):
         coordinates = data.get("coordinates")
         many = [coordinates] if kind == "Polygon" else coordinates
         for i, rings in enumerate(_list(f"{path}: {where}coordinates", many)):
             part = f"polygon {i}: " if kind == "MultiPolygon" else ""
             _polygon(found, path, f"{path}: {where}{part}", rings)
-    elif kind not in ("FeatureCollection", "GeometryCollection"):
+    else:
         found.others[kind[:40]] = found.others.get(kind[:40], 0) + 1
+
+
+def _feature(found: _Found, path: str, where: str, data: dict[str, Any], depth: int) -> None:
+    end, geometry = _end(data), data.get("geometry")
+    if end and isinstance(geometry, dict) and geometry.get("type") == "Point":
+        if end in found.ends:
+            raise BrrtError(f"{path}: {where}a second {end}")
+        spot = _positions(f"{path}: {where}{end}", [geometry.get("coordinates")], (2, 3, 4))
+        found.ends[end] = spot[0, :2]
+    elif geometry is not None:
+        _collect(found, path, where, geometry, depth + 1)
 
 
 def _polygon(found: _Found, path: str, where: str, coordinates: Any) -> None:

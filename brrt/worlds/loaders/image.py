@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from brrt.settings import param
-from brrt.worlds.loaders.loader import Loader
+from brrt.worlds.loaders.loader import Loader, nothing_to_choose
 from brrt.worlds.loaders.pixels import ENDINGS, MAGIC, read_pixels
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
@@ -20,9 +20,7 @@ class ImageMap(Loader):
     free, and half-transparent ones stand on a free background.
     """
 
-    threshold: float = param(
-        0.5, "what is darker is blocked; 0 is black, 1 white", above=0, high=1
-    )
+    threshold: float = param(0.5, "what is darker is blocked; 0 is black, 1 white", above=0, high=1)
     resolution: float = param(1.0, "side of a pixel", above=0, unit="m")
     invert: bool = param(False, "light pixels are blocked, and dark ones free")
 
@@ -39,6 +37,7 @@ class ImageMap(Loader):
         Raises:
             BrrtError: The image is missing, broken or too large.
         """
+        nothing_to_choose(path, query)
         pixels = read_pixels(path)
         free = pixels.white - pixels.grey if self.invert else pixels.grey
         blocked = free < self.threshold * pixels.white

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from brrt.files import read_text
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader
+from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
 from brrt.worlds.world import World
 
 
@@ -26,4 +26,5 @@ class JsonWorld(Loader):
         Raises:
             BrrtError: The text is not such a world.
         """
+        nothing_to_choose(path, query)
         return replace(World.from_json(read_text(path, "a world", MOST_BYTES)), name=str(path))

@@ -81,6 +81,16 @@ def _is_cut(spec: str, i: int) -> bool:
     return spec[i] == "#" or bool(equals and name.strip().isidentifier())
 
 
+def nothing_to_choose(path: Path, query: str) -> None:
+    """Refuse a query to a file that holds none.
+
+    Raises:
+        BrrtError: There is a query.
+    """
+    if query:
+        raise BrrtError(f"{path}: there is nothing to choose in it; leave '#{query[:40]}' away")
+
+
 def finite(where: str, words: Sequence[str]) -> list[float]:
     """Read words as numbers.
 

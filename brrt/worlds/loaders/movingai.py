@@ -16,6 +16,7 @@ from brrt.worlds.loaders.loader import (
     finite,
     named_by_user,
     named_inside,
+    nothing_to_choose,
     whole,
 )
 from brrt.worlds.occupancy import Grid
@@ -29,10 +30,9 @@ _LONGEST = 100_000
 """Rows or columns, at most."""
 
 _CHARACTERS = (FREE + BLOCKED).encode()
-_MEANING = bytes(
-    (chr(code) in BLOCKED) + 2 * (code not in _CHARACTERS) for code in range(256)
-)
+_MEANING = bytes((chr(code) in BLOCKED) + 2 * (code not in _CHARACTERS) for code in range(256))
 """Of each byte: 0 free, 1 blocked, 2 neither."""
+
 
 @dataclass(frozen=True, slots=True)
 class GridMap(Loader):
@@ -54,6 +54,7 @@ class GridMap(Loader):
         Raises:
             BrrtError: The header is wrong, a row is missing or too many, or a character unknown.
         """
+        nothing_to_choose(path, query)
         return World.of_grid(str(path), _grid(_cells(path)))
 
 
@@ -154,9 +155,7 @@ def _scenarios(path: Path) -> Iterator[tuple[int, str]]:
     return ((number, line) for number, line in lines if line.strip())
 
 
-def _centre(
-    where: str, what: str, words: list[str], cells: Cells
-) -> NDArray[np.float64]:
+def _centre(where: str, what: str, words: list[str], cells: Cells) -> NDArray[np.float64]:
     height, width = cells.shape
     x = whole(where, f"the {what}'s x", words[0], 0, width - 1)
     y = whole(where, f"the {what}'s y", words[1], 0, height - 1)

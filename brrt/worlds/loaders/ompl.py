@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.files import lines_of, read_text
 from brrt.settings import param
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader, finite, named_by_user, whole
+from brrt.worlds.loaders.loader import (
+    MOST_BYTES,
+    Loader,
+    finite,
+    named_by_user,
+    nothing_to_choose,
+    whole,
+)
 from brrt.worlds.world import World
 
 _CIRCLES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+(?:units:|x\s+y\s+r\b)")
@@ -47,8 +54,7 @@ class Circles(Loader):
         """
         text = read_text(path, "a world", MOST_BYTES)
         if _QUERIES.match(text[:4096].encode()) is None:
-            if query:
-                raise BrrtError(f"{path}: circles alone, no queries; leave '#{query[:40]}' away")
+            nothing_to_choose(path, query)
             return self._world(path, _circles(str(path), text), None, ())
         number, ends, count = _query(path, text, query)
         notes = [] if query else [f"{path}: query {number} of {count:,}; name one as {path.name}#7"]

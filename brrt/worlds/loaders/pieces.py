@@ -5,6 +5,7 @@ from collections import deque
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry import Polygon
 
 from brrt.errors import BrrtError
 
@@ -38,7 +39,7 @@ def convex_pieces(where: str, rings: list[Floats]) -> list[Floats]:
     if sum(map(len, rings)) > MOST_VERTICES:
         raise BrrtError(f"{where}more than {MOST_VERTICES:,} vertices; simplify the polygon")
     with np.errstate(all="ignore"):
-        polygon = shapely.Polygon(rings[0], rings[1:])
+        polygon = Polygon(rings[0], rings[1:])
         if not polygon.is_valid:
             why, _, place = shapely.is_valid_reason(polygon).partition("[")
             at = f" at {place.rstrip(']')}" if place else ""

@@ -2,13 +2,15 @@
 
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from brrt.errors import BrrtError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image as Picture
 
 ENDINGS = (".png", ".pgm", ".pbm", ".ppm", ".pnm", ".bmp", ".jpg", ".jpeg")
 MAGIC = (b"\x89PNG", b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"BM", b"\xff\xd8\xff")
@@ -41,28 +43,38 @@ def read_pixels(path: Path) -> Pixels:
     Raises:
         BrrtError: It cannot be read, is broken, or claims more pixels than there may be.
     """
+    from PIL import Image, UnidentifiedImageError  # noqa: PLC0415 - costs as much as all of brrt
+
     try:
-        size = path.stat().st_size
-        if size > _MOST_BYTES:
-            raise BrrtError(f"{path}: {size:,} bytes are too many; an image has {_MOST_BYTES:,}")
-        with warnings.catch_warnings(), Image.open(path, formats=_FORMATS) as image:
-            warnings.simplefilter("ignore")
-            width, height = image.size
-            if width * height > _MOST_PIXELS:
-                raise BrrtError(_too_many(path, f"{width:,} x {height:,}"))
-            return _grey(image)
+        return _decoded(path)
     except BrrtError:
         raise
     except Image.DecompressionBombError:
         raise BrrtError(_too_many(path, "far too many")) from None
-    except Image.UnidentifiedImageError:
+    except UnidentifiedImageError:
         raise BrrtError(f"{path}: not an image that brrt reads; {', '.join(_FORMATS)}") from None
     except OSError as error:
-        why = error.strerror or " ".join(str(error).split())[:120]
-        raise BrrtError(f"{path}: {why}") from None
+        raise BrrtError(f"{path}: {error.strerror or _line(error)}") from None
     except Exception as error:  # noqa: BLE001 - decoders raise what they like on broken files
-        why = " ".join(str(error).split())[:120] or type(error).__name__
-        raise BrrtError(f"{path}: a broken image: {why}") from None
+        raise BrrtError(f"{path}: a broken image: {_line(error)}") from None
+
+
+def _decoded(path: Path) -> Pixels:
+    from PIL import Image  # noqa: PLC0415
+
+    size = path.stat().st_size
+    if size > _MOST_BYTES:
+        raise BrrtError(f"{path}: {size:,} bytes are too many; an image has {_MOST_BYTES:,}")
+    with warnings.catch_warnings(), Image.open(path, formats=_FORMATS) as image:
+        warnings.simplefilter("ignore")
+        width, height = image.size
+        if width * height > _MOST_PIXELS:
+            raise BrrtError(_too_many(path, f"{width:,} x {height:,}"))
+        return _grey(image)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120] or type(error).__name__
 
 
 def look_up(table: NDArray[Any], grey: NDArray[Any]) -> NDArray[Any]:
@@ -78,7 +90,7 @@ def _too_many(path: Path, pixels: str) -> str:
     return f"{path}: the header claims {pixels} pixels; a map has at most {_MOST_PIXELS:,}"
 
 
-def _grey(image: Image.Image) -> Pixels:
+def _grey(image: "Picture") -> Pixels:
     if image.mode == "F":
         raise ValueError("floating-point numbers; save it as grey")
     if image.mode.startswith("I"):

@@ -4,18 +4,20 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
-from brrt.worlds.loaders.fields import Fields
-from brrt.worlds.loaders.loader import Loader, named_by_user, named_inside
+from brrt.worlds.loaders.loader import Loader, named_by_user, named_inside, nothing_to_choose
 from brrt.worlds.loaders.pixels import Pixels, look_up, read_pixels
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
+
+if TYPE_CHECKING:
+    from brrt.worlds.loaders.fields import Fields
 
 _MOST_BYTES = 64_000
 """Real ones have 200."""
@@ -58,6 +60,9 @@ class RosMap(Loader):
         Raises:
             BrrtError: A field is missing or of no use, or so is the image.
         """
+        from brrt.worlds.loaders.fields import Fields  # noqa: PLC0415 - yaml is slow to import
+
+        nothing_to_choose(path, query)
         fields = Fields.read(path, _MOST_BYTES)
         for name in _NEEDED:
             if name not in fields.nodes:
@@ -76,7 +81,7 @@ class RosMap(Loader):
         notes = self._notes(path, fields, int(dark.sum()), dark.size)
         return World.of_grid(str(path), grid, notes=tuple(notes))
 
-    def _notes(self, path: Path, fields: Fields, dark: int, cells: int) -> Iterator[str]:
+    def _notes(self, path: Path, fields: "Fields", dark: int, cells: int) -> Iterator[str]:
         for name in fields.nodes:
             if name not in (*_NEEDED, "mode"):
                 yield f"{fields.where(name[:40])}: no field of a map; left out"
@@ -87,7 +92,7 @@ class RosMap(Loader):
                 f"{path.name}:unknown={other} makes them {other}"
             )
 
-    def _pixels(self, path: Path, fields: Fields) -> Pixels:
+    def _pixels(self, path: Path, fields: "Fields") -> Pixels:
         if self.image is not None:
             return read_pixels(named_by_user(path, self.image))
         where, name = fields.where("image"), fields.text("image")
@@ -129,7 +134,7 @@ def occupancy(
     return values
 
 
-def _thresholds(fields: Fields) -> tuple[float, float]:
+def _thresholds(fields: "Fields") -> tuple[float, float]:
     """Return the occupied and the free threshold."""
     occupied, free = fields.number("occupied_thresh"), fields.number("free_thresh")
     for name, value in (("occupied_thresh", occupied), ("free_thresh", free)):
@@ -142,14 +147,14 @@ def _thresholds(fields: Fields) -> tuple[float, float]:
     return occupied, free
 
 
-def _negate(fields: Fields) -> bool:
+def _negate(fields: "Fields") -> bool:
     word = fields.text("negate").lower()
     if word not in _TRUTH:
         raise BrrtError(f"{fields.where('negate')} must be 0 or 1, not {word[:40]!r}")
     return _TRUTH[word]
 
 
-def _mode(fields: Fields) -> str:
+def _mode(fields: "Fields") -> str:
     mode = fields.text("mode") if "mode" in fields.nodes else "trinary"
     if mode not in _MODES:
         raise BrrtError(
