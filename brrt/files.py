@@ -13,6 +13,16 @@ LONGEST_LINE = 10_000
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n?|\n|\Z)")
 
 
+def is_there(path: Path | str) -> bool:
+    """Whether there is something of that name; no if it cannot be told, where pathlib raises."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
+def is_file(path: Path | str) -> bool:
+    """Whether there is a file of that name; no if it cannot be told, where pathlib raises."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
 def read_bytes(path: Path, what: str, most_bytes: int, *, rest: bool = True) -> bytes:
     """Read a file, of whatever kind, into bounded memory.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
-from brrt.files import read_bytes
+from brrt.files import is_file, is_there, read_bytes
 from brrt.settings import pairs
 from brrt.worlds.generators import (
     Boxes2D,
@@ -80,7 +80,7 @@ def make_world(
     path, params, query = FileSpec.parse(spec)
     if not spec:
         raise unknown("world", spec, GENERATORS)
-    if path.exists() or _of_ending(path):
+    if is_there(path) or _of_ending(path):
         world = load_world(path, pairs(f"world {spec}", params), query)
         return replace(world, name=spec) if params or query else world
     if "/" in str(path) or path.suffix:
@@ -91,7 +91,7 @@ def make_world(
 def world_beside(folder: Path, spec: str) -> str:
     """Return the specification of a file that lies in a folder, if it does, or else as it is."""
     beside = str(folder / spec)
-    there = spec.partition(":")[0] not in GENERATORS and FileSpec.parse(beside).path.is_file()
+    there = spec.partition(":")[0] not in GENERATORS and is_file(FileSpec.parse(beside).path)
     return beside if there else spec
 
 
@@ -121,7 +121,7 @@ def _loader(path: Path) -> tuple[str, type[Loader]]:
     named = _of_ending(path)
     if len(named) == 1:
         return named[0]
-    if not path.is_file() and path.exists():
+    if is_there(path) and not is_file(path):
         raise BrrtError(f"{path}: not a file whose beginning tells what it is; {_READS}")
     head = read_bytes(path, "a world", _HEAD, rest=False)
     for name, loader in named or LOADERS.items():

@@ -1,13 +1,13 @@
 """What loaders of world files have in common."""
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import ClassVar, NamedTuple
 
 from brrt.errors import BrrtError
+from brrt.files import is_file, is_there
 from brrt.settings import Settings
 from brrt.worlds.convex import GREATEST
 from brrt.worlds.world import World
@@ -59,10 +59,10 @@ class FileSpec(NamedTuple):
 
         Where nothing exists, the file ends before the first `:name=` or the last `#`.
         """
-        if os.path.exists(spec):  # noqa: PTH110 - Path.exists raises on names that are too long
+        if is_there(spec):
             return cls(Path(spec), "", "")
         cuts = [i for i, letter in enumerate(spec) if letter in ":#"]
-        there = [i for i in cuts if os.path.isfile(spec[:i])]  # noqa: PTH113
+        there = [i for i in cuts if is_file(spec[:i])]
         if there:
             cut = there[-1]
         else:
@@ -151,4 +151,4 @@ def named_by_user(path: Path, name: str) -> Path:
         path: The world file.
         name: What the user says.
     """
-    return Path(name) if os.path.exists(name) else path.parent / name  # noqa: PTH110
+    return Path(name) if is_there(name) else path.parent / name

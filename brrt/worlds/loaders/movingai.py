@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.files import lines_of, read_bytes, read_text
+from brrt.files import is_file, lines_of, read_bytes, read_text
 from brrt.settings import param
 from brrt.worlds.loaders.loader import (
     MOST_BYTES,
@@ -107,11 +107,11 @@ class Scenarios(Loader):
         if self.map is not None:
             return named_by_user(path, self.map)
         bare = path.parent / PurePosixPath(name.replace("\\", "/")).name
-        if bare.is_file():
+        if is_file(bare):
             return bare
         remedy = f"{path.name}:map=PATH"
         named = named_inside(where, path, name, remedy)
-        if not named.is_file():
+        if not is_file(named):
             raise BrrtError(
                 f"{where}: its map {name[:80]!r} is not beside the file; say where: {remedy}"
             )

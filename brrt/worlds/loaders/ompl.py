@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.files import lines_of, read_text
+from brrt.files import is_file, lines_of, read_text
 from brrt.settings import param
 from brrt.worlds.loaders.loader import (
     MOST_BYTES,
@@ -86,7 +86,7 @@ class Circles(Loader):
         if self.obstacles is not None:
             return named_by_user(path, self.obstacles)
         beside = path.with_name(path.name.replace("queries", "obstacles"))
-        if beside == path or not beside.is_file():
+        if beside == path or not is_file(beside):
             raise BrrtError(
                 f"{path}: these are queries, and their circles are not in {beside.name} beside "
                 f"them; say where: {path.name}:obstacles=PATH"

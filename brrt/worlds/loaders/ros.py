@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.files import is_file
 from brrt.settings import param
 from brrt.worlds.loaders.loader import Loader, named_by_user, named_inside, nothing_to_choose
 from brrt.worlds.loaders.pixels import Pixels, look_up, read_pixels
@@ -98,7 +99,7 @@ class RosMap(Loader):
         where, name = fields.where("image"), fields.text("image")
         remedy = f"{path.name}:image=PATH"
         image = named_inside(where, path, name, remedy)
-        if not name or not image.is_file():
+        if not name or not is_file(image):
             raise BrrtError(f"{where}: there is no image {name[:80]!r} here; say where: {remedy}")
         return read_pixels(image)
 
