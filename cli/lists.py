@@ -29,8 +29,9 @@ def worlds(*, as_json: Json = False) -> None:
 
     _print(dict(GENERATORS), as_json)
     if not as_json:
+        endings = ", ".join(dict.fromkeys(e for kind in LOADERS.values() for e in kind.endings))
         out.print(
-            f"Use one as --world circles2d:n=80,seed=3, or give a file ({', '.join(LOADERS)}).",
+            f"Use one as --world circles2d:n=80,seed=3, or give a file ({endings}).",
             markup=False,
         )
 
