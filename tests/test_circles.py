@@ -1,5 +1,6 @@
 """OMPL's circle files, and blocks that reach outside their boundary."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,7 @@ def test_queries(tmp_path: Path) -> None:
         "#x": "#x: a query must be a whole number from 0",
         ":obstacles=none.txt": f": {tmp_path / 'none.txt'}: No such file or directory",
     }.items():
-        assert refused(lambda spec=spec: make_world(f"{path}{spec}")).startswith(f"{path}{message}")
+        assert refused(partial(make_world, f"{path}{spec}")).startswith(f"{path}{message}")
     path.write_text("0 start: 1 2\n0 goal: 70 2\n")
     assert refused(lambda: load_world(path)) == (
         f"{path}: the goal 70, 2 lies outside the bounds of the circles; "
