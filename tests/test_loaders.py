@@ -5,12 +5,11 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from brrt import BrrtError, Scenario
 from brrt.worlds import LOADERS, World, load_world, make_world
@@ -294,7 +293,7 @@ def test_endless_files(device: str, tmp_path: Path) -> None:
     assert "it does not end" in message
     assert used < 200
     for name in ("w.txt", "w.json", "w.scen", "w.yaml", "w.png", "w"):
-        assert refused(lambda name=name: load_world(tmp_path / name))
+        assert refused(partial(load_world, tmp_path / name))
 
 
 BOMBS = {
@@ -383,10 +382,3 @@ def test_real_worlds(path: Path | None) -> None:
     assert sum(len(o) for o in (world.boxes, world.balls)) or (
         world.grid and world.grid.cells.any()
     )
-
-
-def image_bytes(image: Image.Image, kind: str) -> bytes:
-    """An image as a file of some format."""
-    buffer = BytesIO()
-    image.save(buffer, kind)
-    return buffer.getvalue()

@@ -65,8 +65,8 @@ def _decoded(path: Path) -> Pixels:
     size = path.stat().st_size
     if size > _MOST_BYTES:
         raise BrrtError(f"{path}: {size:,} bytes are too many; an image has {_MOST_BYTES:,}")
-    with warnings.catch_warnings(), Image.open(path, formats=_FORMATS) as image:
-        warnings.simplefilter("ignore")
+    ignoring = warnings.catch_warnings(action="ignore")
+    with ignoring, Image.open(path, formats=_FORMATS) as image:
         width, height = image.size
         if width * height > _MOST_PIXELS:
             raise BrrtError(_too_many(path, f"{width:,} x {height:,}"))
