@@ -1,5 +1,8 @@
-"""Text files that users give us: read whole, or refused in one line."""
+"""Files: a text is read whole or refused in one line, and what we write is never half there."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from brrt.errors import BrrtError
@@ -25,3 +28,23 @@ def read_text(path: Path, what: str, most_bytes: int) -> str:
         raise BrrtError(f"{path}: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise BrrtError(f"{path}: not a text file") from None
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write a file elsewhere; it takes its name, and any older file's place, once it is whole.
+
+    Yields:
+        The name to write to, in the same folder and with the same ending.
+
+    Raises:
+        BrrtError: The file cannot be written.
+    """
+    unfinished = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+    try:
+        yield unfinished
+        unfinished.replace(path)
+    except OSError as error:
+        raise BrrtError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        unfinished.unlink(missing_ok=True)
