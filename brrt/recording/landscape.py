@@ -1,6 +1,7 @@
 """A world in Rerun: its obstacles and bounds, marks for start and goal, and a view of it."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,14 @@ from numpy.typing import NDArray
 
 from brrt.colours import FREE, OBSTACLE, OBSTACLE_3D, OUTLINE, Colour
 from brrt.worlds.occupancy import Grid
+from brrt.worlds.survey import covered
 from brrt.worlds.world import World
 
 _LAYERS, _OVERLAP = 5, 1.5
 """Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
 covers the missing corner of the next."""
+_PIXELS = 640
+"""Along the longer side of the image that fills polygons: as fine as a window shows a map."""
 
 
 def log_world(rec: rr.RecordingStream, world: World) -> None:
@@ -80,7 +84,10 @@ def _still_2d(world: World) -> dict[str, Any]:
     still: dict[str, Any] = {
         "/world/bounds": rr.Boxes2D(
             mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-1, draw_order=-1
-        )
+        ),
+        "/world/obstacles": rr.AnnotationContext(
+            [(0, "free", (0, 0, 0, 0)), (1, "blocked", OBSTACLE)]
+        ),
     }
     if len(world.balls):
         radii = world.balls[:, 2]
@@ -90,24 +97,25 @@ def _still_2d(world: World) -> dict[str, Any]:
         )
     if len(world.boxes):
         still["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
-    if world.polygons:
-        still["/world/obstacles/polygons"] = _filled_polygons(world.polygons)
+    outside = () if world.grid is None else tuple(world.grid.outside(world.lower, world.upper))
+    if world.polygons or outside:
+        still |= _filled_polygons(replace(world, polygons=world.polygons + outside, grid=None))
     if world.grid is not None:
-        still |= _still_cells(world.grid, world)
+        still |= _still_cells(world.grid)
     return still
 
 
-def _still_cells(grid: Grid, world: World) -> Iterator[tuple[str, Any]]:
-    """Draw the cells as an image in a frame of its own, on one that is blocked all over."""
-    half = (world.upper - world.lower) / 2
-    outside = np.full((2, 2, 3), OBSTACLE, np.uint8)  # Rerun takes a single pixel for no image
-    yield "/world/outside", rr.Transform3D(translation=[*world.lower, 0], scale=[*half, 1])
-    yield "/world/outside/all", rr.Image(outside, color_model="RGB", draw_order=-2)
-    pixels = np.where(grid.cells[..., None], OBSTACLE, FREE).astype(np.uint8)
+def _still_cells(grid: Grid) -> Iterator[tuple[str, Any]]:
+    """Draw the cells as an image in a frame of its own."""
     turn = rr.RotationAxisAngle([0, 0, 1], radians=grid.yaw)
     frame = rr.Transform3D(translation=[*grid.origin, 0], rotation=turn, scale=grid.resolution)
     yield "/world/obstacles/grid", frame
-    yield "/world/obstacles/grid/cells", rr.Image(pixels, color_model="RGB", draw_order=-1.5)
+    yield "/world/obstacles/grid/cells", _stencil(grid.cells)
+
+
+def _stencil(cells: NDArray[np.bool_]) -> rr.SegmentationImage:
+    """Draw pixels in the colour of obstacles, or not at all."""
+    return rr.SegmentationImage(cells.astype(np.uint8), opacity=1.0, draw_order=-1.5)
 
 
 def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:
@@ -133,27 +141,24 @@ def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.
     )
 
 
-def _filled_polygons(polygons: tuple[NDArray[np.float64], ...]) -> rr.LineStrips2D:
-    """Polygons of thick lines nested in each other, and an edge, as `_filled_boxes`.
-
-    Each line is the outline moved inwards: towards the middle, so far that it stays within.
-    """
-    strips, radii = list[NDArray[np.float64]](), list[float]()
-    for polygon in polygons:
-        closed = np.concatenate([polygon, polygon[:1]])
-        if len(polygon) > 2:
-            middle = polygon.mean(axis=0)
-            along, offset = np.diff(closed, axis=0), polygon - middle
-            heights = offset[:, 0] * along[:, 1] - offset[:, 1] * along[:, 0]
-            inner = float((heights / np.hypot(*along.T)).min())
-            radius = inner / (1 + _OVERLAP * (_LAYERS - 1))
-            for layer in range(_LAYERS):
-                inset = (1 + _OVERLAP * layer) * radius
-                strips.append(middle + (closed - middle) * max(1 - inset / inner, 0.0))
-                radii.append(radius)
-        strips.append(closed)
-        radii.append(-0.5 if len(polygon) > 2 else -1.5)
-    return rr.LineStrips2D(strips, radii=radii, colors=OBSTACLE, draw_order=0)
+def _filled_polygons(world: World) -> Iterator[tuple[str, Any]]:
+    """Polygons as lines around an image of what they cover: Rerun fills no shapes in 2D."""
+    pixel = world.extent / _PIXELS
+    columns, rows = np.maximum(1, np.ceil((world.upper - world.lower) / pixel)).astype(int)
+    y, x = np.mgrid[:rows, :columns]
+    points = world.lower + pixel * (np.stack([x, y], axis=-1).reshape(-1, 2) + 0.5)
+    hulls = replace(world, balls=np.empty((0, 3)), boxes=np.empty((0, 4)))
+    yield (
+        "/world/obstacles/inside",
+        rr.Transform3D(translation=[*world.lower, 0], scale=pixel),
+    )
+    yield "/world/obstacles/inside/pixels", _stencil(covered(hulls, points).reshape(rows, columns))
+    outlines = [np.concatenate([polygon, polygon[:1]]) for polygon in world.polygons]
+    radii = [-0.5 if len(polygon) > 2 else -1.5 for polygon in world.polygons]
+    yield (
+        "/world/obstacles/polygons",
+        rr.LineStrips2D(outlines, radii=radii, colors=OBSTACLE, draw_order=0),
+    )
 
 
 def _still_3d(world: World) -> dict[str, Any]:

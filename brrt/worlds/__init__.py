@@ -11,14 +11,37 @@ from brrt.errors import BrrtError, unknown
 from brrt.files import read_text
 from brrt.settings import pairs
 from brrt.worlds.blocks import load_blocks
-from brrt.worlds.generators import (
+from brrt.worlds.generators.courses import (
+    Cube3D,
+    Hurdles3D,
+    Offset3D,
+    Room3D,
+    Tower3D,
+    Window3D,
+)
+from brrt.worlds.generators.forests import Forest2D, Forest3D
+from brrt.worlds.generators.generator import Generator
+from brrt.worlds.generators.mazes import Maze2D, Maze3D, Rooms2D, Spiral2D
+from brrt.worlds.generators.scattered import (
     Boxes2D,
     Boxes3D,
     Circles2D,
-    Generator,
     Polygons2D,
     Spheres3D,
     Squares2D,
+)
+from brrt.worlds.generators.traps import BugTrap2D, BugTrap3D
+from brrt.worlds.generators.walls import (
+    Empty2D,
+    Empty3D,
+    Enclosure2D,
+    Enclosure3D,
+    Gap2D,
+    Gap3D,
+    Passage2D,
+    Passage3D,
+    Walls2D,
+    Walls3D,
 )
 from brrt.worlds.movingai import load_grid
 from brrt.worlds.occupancy import Grid
@@ -31,6 +54,30 @@ GENERATORS: Mapping[str, type[Generator]] = {
     "polygons2d": Polygons2D,
     "boxes3d": Boxes3D,
     "spheres3d": Spheres3D,
+    "forest2d": Forest2D,
+    "forest3d": Forest3D,
+    "maze2d": Maze2D,
+    "maze3d": Maze3D,
+    "rooms2d": Rooms2D,
+    "spiral2d": Spiral2D,
+    "gap2d": Gap2D,
+    "gap3d": Gap3D,
+    "passage2d": Passage2D,
+    "passage3d": Passage3D,
+    "walls2d": Walls2D,
+    "walls3d": Walls3D,
+    "enclosure2d": Enclosure2D,
+    "enclosure3d": Enclosure3D,
+    "bugtrap2d": BugTrap2D,
+    "bugtrap3d": BugTrap3D,
+    "empty2d": Empty2D,
+    "empty3d": Empty3D,
+    "cube3d": Cube3D,
+    "window3d": Window3D,
+    "tower3d": Tower3D,
+    "room3d": Room3D,
+    "hurdles3d": Hurdles3D,
+    "offset3d": Offset3D,
 }
 
 LOADERS: Mapping[str, Callable[[Path, str], World]] = {
