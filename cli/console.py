@@ -41,11 +41,13 @@ def print_json(data: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
 
 
-def print_rows(rows: Sequence[Mapping[str, str]], title: str | None = None) -> None:
-    """Print a table of rows with the same keys."""
+def print_rows(
+    rows: Sequence[Mapping[str, str]], title: str | None = None, *, whole: int = 2
+) -> None:
+    """Print a table of rows with the same keys; the first `whole` columns are not wrapped."""
     table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
     for i, name in enumerate(rows[0]):
-        table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < 2)
+        table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < whole)
     for row in rows:
         table.add_row(*(row[name] for name in row))
     out.print(table)

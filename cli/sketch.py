@@ -20,7 +20,7 @@ _DEPTH = 32
 """Points along the line of sight, in 3D."""
 _FAINT = 0.25
 """Share that what is too thin to be met by points is taken to have."""
-_SHADES = {2: (0.06, 0.3, 0.55, 0.8), 3: (0.02, 0.12, 0.3, 0.6)}
+_SHADES = {2: (0.05, 0.22, 0.45, 0.75), 3: (0.02, 0.12, 0.3, 0.6)}
 """From which share on a character is one darker; a look through a whole world meets little."""
 _BLOCKS, _LETTERS = " ░▒▓█", " .:*#"
 _FRAMES = {True: tuple("┌─┐│└┘"), False: tuple("+-+|++")}

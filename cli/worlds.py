@@ -68,7 +68,8 @@ def list_worlds(
         print_json(entries)
         return
     if name is None:
-        print_rows([{"name": key, "about": entry["about"]} for key, entry in entries.items()])
+        overview = [{"name": key, "about": entry["about"]} for key, entry in entries.items()]
+        print_rows(overview, whole=1)
         out.print()
     print_described(entries)
     if name is None:

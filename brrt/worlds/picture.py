@@ -146,6 +146,7 @@ def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
 
 
 def _draw_3d(world: World, ax: Any) -> None:
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # noqa: PLC0415
 
     faces = np.concatenate([_box_faces(world.boxes), _ball_faces(world.balls)])
@@ -171,7 +172,9 @@ def _draw_3d(world: World, ax: Any) -> None:
     ax.set(**{f"{axis}lim": (low, high) for axis, low, high in limits})
     ax.set_box_aspect(world.upper - world.lower)
     ax.tick_params(labelsize=7, labelcolor=_of(OUTLINE), color=_of(OUTLINE))
-    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+    sizes = (world.upper - world.lower) / world.extent
+    for axis, size in zip((ax.xaxis, ax.yaxis, ax.zaxis), sizes, strict=True):
+        axis.set_major_locator(MaxNLocator(max(1, round(5 * size))))
         axis.set_pane_color((1, 1, 1, 0))
         axis.line.set(color=_of(OUTLINE), linewidth=0.6)
         axis._axinfo["grid"].update(linewidth=0.25, color="0.85")  # noqa: SLF001 - no public way

@@ -283,8 +283,10 @@ class World:
         Raises:
             BrrtError: There is no such generator or parameter, or a value is of no use.
         """
-        from brrt.worlds import make_world  # noqa: PLC0415 - it imports this module
+        from brrt.worlds import GENERATORS, make_world  # noqa: PLC0415 - it imports this module
 
+        if generator not in GENERATORS:
+            raise unknown("world", generator, GENERATORS)
         given = (f"{name}={_text(value)}" for name, value in parameters.items())
         return make_world(f"{generator}:{','.join(given)}".removesuffix(":"))
 
@@ -338,6 +340,8 @@ class World:
 
 def _text(value: Any) -> str:
     """Write a value as the command line takes it."""
+    if value is None:
+        return "auto"
     return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
 
 
