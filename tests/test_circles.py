@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from brrt.worlds import load_world, make_world
-from tests.test_loaders import CIRCLES, QUERIES, REAL, refused
+from tests.world_files import CIRCLES, QUERIES, REAL, refused
 
 
 def test_circles(tmp_path: Path) -> None:

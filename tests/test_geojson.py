@@ -15,7 +15,7 @@ from shapely.geometry import Polygon
 from brrt.worlds import World, load_world, make_world
 from brrt.worlds.convex import convex_polygon
 from brrt.worlds.loaders.pieces import convex_pieces
-from tests.test_loaders import SQUARE, refused
+from tests.world_files import SQUARE, refused
 
 L = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4], [0, 0]]
 HOLE = [[1, 1], [1, 2], [2, 2], [2, 1], [1, 1]]

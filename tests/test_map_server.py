@@ -13,7 +13,7 @@ from PIL import Image
 from brrt.worlds import Grid, World, load_world, make_world
 from brrt.worlds.loaders.pixels import Pixels, read_pixels
 from brrt.worlds.loaders.ros import occupancy
-from tests.test_loaders import PGM, REAL, YAML, refused
+from tests.world_files import PGM, REAL, YAML, refused
 
 
 def naive_occupancy(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from brrt.errors import BrrtError
 from brrt.worlds import World, load_world, make_world
 from brrt.worlds.loaders.movingai import BLOCKED, FREE, parse_cells
-from tests.test_loaders import refused
+from tests.world_files import refused
 
 GRIDS = Path(__file__).parents[2] / "shared" / "worlds" / "movingai"
 HEAD = "type octile\nheight 2\nwidth 3\nmap\n"
