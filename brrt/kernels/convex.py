@@ -101,25 +101,28 @@ class Body(NamedTuple):
 
 def build_shapes(hulls: list[Floats], radii: list[float] | None = None) -> Shapes:
     """Lay out shapes for the kernels; vertices counter-clockwise, shape (k, 2) each."""
-    axes, circles = [np.empty((0, 3))], [np.empty((0, 3))]
-    for hull in hulls:
-        directions = axes_of(hull)
-        # Around the middle of the bounding box: close to the smallest circle, and simple.
-        centre = (hull.min(axis=0) + hull.max(axis=0)) / 2
-        reach = np.hypot(*(hull - centre).T).max() * (1 + 1e-15)
-        offsets = (directions @ hull.T).max(axis=1, keepdims=True)
-        axes.append(np.concatenate([directions, offsets], axis=1))
-        circles.append(np.array([[*centre, reach]]))
-    first = np.cumsum(
-        [[0, 0], *([len(hull), len(some)] for hull, some in zip(hulls, axes[1:], strict=True))],
-        axis=0,
-        dtype=np.int32,
-    )
-    added = np.zeros(len(hulls)) if radii is None else np.array(radii, np.float64)
-    around = np.concatenate(circles)
-    around[:, 2] += added
+    corners = np.array([len(hull) for hull in hulls], np.int64)
+    # A point has no axes, a line segment four, a polygon one for each side.
+    sides = np.choose(np.minimum(corners, 3), [0, 0, 4, corners])
+    first = np.concatenate([[[0, 0]], np.cumsum([corners, sides], axis=1).T])
     vertices = np.concatenate([np.empty((0, 2)), *hulls])
-    return Shapes(vertices, np.concatenate(axes), first, around, added)
+    axes, circles = np.empty((first[-1, 1], 3)), np.empty((len(hulls), 3))
+    for k in np.unique(corners).tolist():
+        alike = np.flatnonzero(corners == k)
+        some = vertices[first[alike, :1] + np.arange(k)]
+        directions = axes_of(some)
+        reach = directions[:, :, None, 0] * some[:, None, :, 0]
+        reach = (reach + directions[:, :, None, 1] * some[:, None, :, 1]).max(axis=2)
+        places = first[alike, 1:] + np.arange(directions.shape[1])
+        axes[places] = np.concatenate([directions, reach[..., None]], axis=2)
+        # Around the middle of the bounding box: close to the smallest circle, and simple.
+        centres = (some.min(axis=1) + some.max(axis=1)) / 2
+        away = some - centres[:, None]
+        circles[alike, :2] = centres
+        circles[alike, 2] = np.hypot(away[..., 0], away[..., 1]).max(axis=1) * (1 + 1e-15)
+    added = np.zeros(len(hulls)) if radii is None else np.array(radii, np.float64)
+    circles[:, 2] += added
+    return Shapes(vertices, axes, first.astype(np.int32), circles, added)
 
 
 def build_body(

@@ -80,19 +80,26 @@ def _turns(vertices: Floats) -> tuple[Floats, Floats, float]:
 
 
 def axes_of(vertices: Floats) -> Floats:
-    """Directions that decide whether something is apart from a shape, shape (m, 2), unit length.
+    """Directions that decide whether something is apart from shapes, of unit length.
 
     The outward normals of a polygon, counter-clockwise; a line segment's normals and directions,
     as if it were a rectangle; none for a point.
+
+    Args:
+        vertices: Of one shape or of several with as many vertices each, shape (..., k, 2).
+
+    Returns:
+        Directions, shape (..., m, 2).
     """
-    if len(vertices) < 2:
-        return np.empty((0, 2))
-    along = np.roll(vertices, -1, axis=0) - vertices
+    k = vertices.shape[-2]
+    if k < 2:
+        return np.empty((*vertices.shape[:-2], 0, 2))
+    along = np.roll(vertices, -1, axis=-2) - vertices
     # Divided by the greatest component first: the squares of tiny ones would vanish.
-    along /= np.abs(along).max(axis=1, keepdims=True)
-    along /= np.hypot(*along.T)[:, None]
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    return np.concatenate([normals, along]) if len(vertices) == 2 else normals
+    along /= np.abs(along).max(axis=-1, keepdims=True)
+    along /= np.hypot(along[..., 0], along[..., 1])[..., None]
+    normals = np.stack([along[..., 1], -along[..., 0]], axis=-1)
+    return np.concatenate([normals, along], axis=-2) if k == 2 else normals
 
 
 def gap(one: Floats, other: Floats) -> float:

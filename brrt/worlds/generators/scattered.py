@@ -1,35 +1,52 @@
 """Worlds drawn from a seed: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
 
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.settings import Settings, param
+from brrt.settings import param
+from brrt.worlds.generators.density import fewest
+from brrt.worlds.generators.generator import (
+    CLEARANCE,
+    Ends,
+    Floats,
+    Scenery,
+    Seeded,
+    no_fit,
+)
+from brrt.worlds.shapes import Shapes, shapes_of
 from brrt.worlds.world import World
 
-Floats = NDArray[np.float64]
-_CLEARANCE = 0.01
-"""Distance kept between obstacles and start or goal, as a fraction of the map's size."""
 _REDRAWS = 1000
+_USUAL, _MOST = 50, 10_000_000
+_BATCHES = [256 << i for i in range(13)]
+"""Obstacles that are drawn at a time, the last number again and again, where a share of the map is
+asked for: the sequence does not depend on the share."""
 
 
 @dataclass(frozen=True, slots=True)
-class Generator(Settings):
+class Scattered(Seeded):
     """Obstacles spread evenly over a square or cube that reaches from 0 to `size`.
 
     Start and goal stand in opposite corners, 5 % of the size from each wall, unless asked for
     elsewhere. An obstacle that would cover one of them is drawn anew.
     """
 
-    dim: ClassVar[int]
+    n: int = param(_USUAL, "number of obstacles", low=0, high=_MOST)
+    density: float | None = param(
+        None, "share of the map to cover, instead of a number; auto: as n says", low=0, high=1
+    )
 
-    n: int = param(50, "number of obstacles", low=0, high=10_000_000)
-    size: float = param(100.0, "side of the map", above=0)
-    seed: int = param(0, "seed of the obstacles", low=0)
+    def __post_init__(self) -> None:
+        """Check that one thing alone says how many obstacles there are."""
+        Seeded.__post_init__(self)
+        if self.density is not None and self.n != _USUAL:
+            raise BrrtError(f"n {self.n} and density {self.density:g} contradict; give one of them")
 
     @abstractmethod
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
@@ -42,62 +59,52 @@ class Generator(Settings):
         """Whether each obstacle comes closer to a point than the clearance."""
 
     @abstractmethod
-    def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
-        """Make the world of the obstacles; `ends` are start and goal."""
+    def place(self, centres: Floats, halves: Floats) -> Scenery:
+        """Make obstacles of what was drawn."""
 
-    def make(
-        self,
-        name: str,
-        start: Floats | None = None,
-        goal: Floats | None = None,
-        room: float = 0.0,
-    ) -> World:
-        """Make the world.
+    def scenery(self, rng: np.random.Generator, ends: Ends, /) -> Scenery:
+        """Draw the obstacles: as many as asked for, or as it takes."""
+        if self.density is None:
+            return self.place(*self._apart(rng, self.n, ends))
+        drawn: list[tuple[Floats, Floats]] = []
 
-        Args:
-            name: Its name.
-            start: Point to keep free, shape (d,); 5 % of the size in each coordinate by default.
-            goal: Another; 95 % by default.
-            room: Distance to keep free around them, beyond the clearance, for a robot's body.
+        def batches() -> Iterator[Shapes]:
+            count = 0
+            while count < _MOST:
+                n = min(_BATCHES[min(len(drawn), len(_BATCHES) - 1)], _MOST - count)
+                count += n
+                drawn.append(self._apart(rng, n, ends))
+                scenery = self.place(*drawn[-1])._asdict()
+                yield from shapes_of(World("", np.zeros(self.dim), self.upper(), **scenery))
 
-        Raises:
-            BrrtError: The obstacles are so large that they leave no room for start and goal.
-        """
-        clearance = _CLEARANCE * self.size + room
-        part = max(0.05, min(clearance / self.size, 0.5) if room else 0.0)
-        ends = [self._end(given, part) for given, part in ((start, part), (goal, 1 - part))]
-        rng = np.random.default_rng(self.seed)
-        centres, halves = self.draw(rng, self.n)
+        count, share = fewest(self.density, self.upper(), batches(), _MOST)
+        centres, halves = (np.concatenate(parts)[:count] for parts in zip(*drawn, strict=True))
+        note = f"density {self.density:g} asked for: {count} obstacles cover {share:.4f} of the map"
+        return self.place(centres, halves)._replace(notes=(note,))
+
+    def _apart(self, rng: np.random.Generator, n: int, ends: Ends) -> tuple[Floats, Floats]:
+        """Draw n obstacles that keep off start and goal."""
+        clearance = CLEARANCE * self.size + ends.room
+        centres, halves = self.draw(rng, n)
         for _ in range(_REDRAWS):
-            bad = np.zeros(self.n, bool)
-            for end in ends:
+            bad = np.zeros(n, bool)
+            for end in (ends.start, ends.goal):
                 bad |= self.covers(centres, halves, end, clearance)
             count = int(bad.sum())
             if count == 0:
-                return self.place(name, centres, halves, ends)
+                return centres, halves
             centres[bad], halves[bad] = self.draw(rng, count)
         raise BrrtError(
-            f"world {name}: {count} obstacles of this size leave no room for start and goal; "
+            f"{count} obstacles of this size leave no room for start and goal; "
             f"make them smaller or the map larger"
         )
-
-    def _end(self, given: Floats | None, part: float) -> Floats:
-        """Return the point to keep free; one that is of no use is the query's to refuse."""
-        if given is not None and len(given) == self.dim and np.isfinite(given).all():
-            return np.asarray(given, np.float64)
-        return np.full(self.dim, part * self.size)
 
     def _centres(self, rng: np.random.Generator, halves: Floats) -> Floats:
         return halves + (self.size - 2 * halves) * rng.random(halves.shape)
 
-    def _world(self, name: str, ends: list[Floats], **obstacles: Any) -> World:
-        lower, upper = np.zeros(self.dim), np.full(self.dim, self.size)
-        start, goal = ends
-        return World(name, lower, upper, start=start, goal=goal, **obstacles)
-
 
 @dataclass(frozen=True, slots=True)
-class Balls(Generator):
+class Balls(Scattered):
     """Circles or spheres with radii spread evenly over a range."""
 
     min_radius: float = param(1.0, "least radius", above=0)
@@ -105,7 +112,7 @@ class Balls(Generator):
 
     def __post_init__(self) -> None:
         """Check the range."""
-        Generator.__post_init__(self)
+        Scattered.__post_init__(self)
         _check_sizes("radius", self.min_radius, self.max_radius, self.size / 2)
 
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
@@ -121,14 +128,14 @@ class Balls(Generator):
         reach = halves[:, 0] + clearance
         return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
-    def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
+    def place(self, centres: Floats, halves: Floats) -> Scenery:
         """Write each ball as centre and radius."""
         balls = np.concatenate([centres, halves[:, :1]], axis=1)
-        return self._world(name, ends, balls=balls)
+        return Scenery(balls=balls)
 
 
 @dataclass(frozen=True, slots=True)
-class Boxes(Generator):
+class Boxes(Scattered):
     """Axis-aligned boxes with sides spread evenly over a range."""
 
     cubes: ClassVar[bool] = False
@@ -138,7 +145,7 @@ class Boxes(Generator):
 
     def __post_init__(self) -> None:
         """Check the range."""
-        Generator.__post_init__(self)
+        Scattered.__post_init__(self)
         _check_sizes("side", self.min_side, self.max_side, self.size)
 
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
@@ -155,17 +162,17 @@ class Boxes(Generator):
         near = np.abs(centres - point) <= halves + clearance
         return np.asarray(near.all(axis=1))
 
-    def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
+    def place(self, centres: Floats, halves: Floats) -> Scenery:
         """Write each box as its least and greatest corner."""
         boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-        return self._world(name, ends, boxes=boxes)
+        return Scenery(boxes=boxes)
 
 
 def _check_sizes(what: str, least: float, greatest: float, limit: float) -> None:
     if least > greatest:
         raise BrrtError(f"min_{what} {least:g} is above max_{what} {greatest:g}; swap them")
     if greatest > limit:
-        raise BrrtError(f"max_{what} {greatest:g} does not fit the map; it is at most {limit:g}")
+        raise no_fit(f"max_{what}", greatest, limit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +212,7 @@ class Spheres3D(Balls):
 
 
 @dataclass(frozen=True, slots=True)
-class Polygons2D(Generator):
+class Polygons2D(Scattered):
     """Convex polygons with their corners on circles, on a square map.
 
     The corners are spread around the circle by 1 part each, give or take 0.3 parts.
@@ -220,7 +227,7 @@ class Polygons2D(Generator):
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        Generator.__post_init__(self)
+        Scattered.__post_init__(self)
         _check_sizes("radius", self.min_radius, self.max_radius, self.size / 2)
         _check_sizes("corners", self.min_corners, self.max_corners, np.inf)
 
@@ -240,10 +247,10 @@ class Polygons2D(Generator):
         reach = halves[:, 0] + clearance
         return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
-    def place(self, name: str, centres: Floats, halves: Floats, ends: list[Floats]) -> World:
+    def place(self, centres: Floats, halves: Floats) -> Scenery:
         """Put the corners of each polygon on its circle."""
         polygons = []
         for centre, (radius, corners, *angles) in zip(centres, halves, strict=True):
             around = np.array(angles[: int(corners)])
             polygons.append(centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1))
-        return self._world(name, ends, polygons=tuple(polygons))
+        return Scenery(polygons=tuple(polygons))

@@ -1,0 +1,1 @@
+"""Generators of worlds: what is scattered, cells and ways, walls, and scenes; see GENERATORS."""

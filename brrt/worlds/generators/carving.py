@@ -1,0 +1,55 @@
+"""Boxes that are left when something is cut out of a box or a lattice."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+def without(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
+    """Return the boxes that fill a box but for a hole; none of them is flat.
+
+    Args:
+        lower: Least corner of the box, shape (d,).
+        upper: Its greatest corner.
+        hole: Least and greatest corner of the hole, shape (2, d); it may reach beyond the box.
+
+    Returns:
+        Boxes as least and greatest corner, shape (k, 2 d): at most two an axis, those of the first
+        axis the largest.
+    """
+    low, high = np.array(lower, np.float64), np.array(upper, np.float64)
+    first, last = np.clip(np.asarray(hole, np.float64), low, high)
+    boxes = []
+    for axis in range(len(low)):
+        if low[axis] < first[axis]:
+            boxes.append([*low, *np.where(np.arange(len(low)) == axis, first, high)])
+        if last[axis] < high[axis]:
+            boxes.append([*np.where(np.arange(len(low)) == axis, last, low), *high])
+        low[axis], high[axis] = first[axis], last[axis]
+    return np.array(boxes).reshape(-1, 2 * len(low))
+
+
+def merged(blocked: NDArray[np.bool_], edges: Floats) -> Floats:
+    """Return few boxes that fill the blocked cells of a lattice and no others.
+
+    Cells become runs along the first axis, equal runs that touch become plates along the next.
+
+    Args:
+        blocked: Whether each cell is, shape (n, ..., n), one axis a dimension.
+        edges: Where cells begin and end, the same along each axis, increasing, shape (n + 1,).
+
+    Returns:
+        Boxes as least and greatest corner, shape (k, 2 d); touching ones share coordinates.
+    """
+    low = np.argwhere(blocked)
+    high = low + 1
+    for axis in range(blocked.ndim):
+        others = np.delete(np.concatenate([low, high], axis=1), [axis, axis + blocked.ndim], axis=1)
+        order = np.lexsort([low[:, axis], *others.T])
+        low, high, others = low[order], high[order], others[order]
+        first = np.ones(len(low), np.bool_)
+        first[1:] = (others[1:] != others[:-1]).any(axis=1) | (low[1:, axis] != high[:-1, axis])
+        last = np.roll(first, -1)
+        low, high = low[first], high[last]
+    return np.concatenate([edges[low], edges[high]], axis=1)

@@ -1,0 +1,259 @@
+"""Worlds of cells and the ways between them: mazes, rooms and a spiral."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+from brrt.settings import param
+from brrt.worlds.generators.carving import merged
+from brrt.worlds.generators.generator import Ends, Fixed, Floats, Scenery, Seeded
+
+Pairs = NDArray[np.int64]
+_WALL = 0.1
+"""Thickness of the walls, as a fraction of the distance from cell to cell."""
+
+
+def spanning_tree(shape: tuple[int, ...], rng: np.random.Generator) -> Pairs:
+    """Draw a tree that joins all cells of a lattice: one way leads from each to each.
+
+    A walk goes on to a random neighbour that was not visited, and where there is none goes back;
+    such trees have long winding branches.
+
+    Args:
+        shape: Cells along each axis.
+        rng: Where the draws come from.
+
+    Returns:
+        Pairs of neighbours, as flat indices, shape (cells - 1, 2).
+    """
+    steps = np.concatenate(
+        [np.eye(len(shape), dtype=np.int64), -np.eye(len(shape), dtype=np.int64)]
+    )
+    places = np.stack(np.unravel_index(np.arange(np.prod(shape)), shape), axis=1)
+    around = places[:, None] + steps
+    within = ((around >= 0) & (around < shape)).all(axis=2)
+    flat = np.ravel_multi_index(tuple(np.moveaxis(around, 2, 0)), shape, mode="clip")
+    untried = rng.permuted(np.where(within, flat, -1), axis=1).tolist()
+    visited = bytearray(len(untried))
+    visited[0] = True
+    walk, pairs = [0], []
+    while walk:
+        cell = walk[-1]
+        while untried[cell]:
+            other = untried[cell].pop()
+            if other >= 0 and not visited[other]:
+                visited[other] = True
+                pairs.append((cell, other))
+                walk.append(other)
+                break
+        else:
+            walk.pop()
+    return np.array(pairs, np.int64).reshape(-1, 2)
+
+
+def walls_of(shape: tuple[int, ...], pairs: Pairs, edges: Floats) -> Floats:
+    """Return the walls between cells, shape (k, 2 d), but for those between the pairs.
+
+    Args:
+        shape: Cells along each axis.
+        pairs: Cells with a way between them, as flat indices, shape (n, 2).
+        edges: Where cells and walls begin and end in turn, shape (2 cells,).
+    """
+    blocked = np.ones([2 * n - 1 for n in shape], np.bool_)
+    blocked[(slice(None, None, 2),) * len(shape)] = False
+    one, other = (np.array(np.unravel_index(cells, shape)) for cells in pairs.T)
+    blocked[tuple(one + other)] = False
+    return merged(blocked, edges)
+
+
+def _edges(size: float, cells: int, wall: float) -> Floats:
+    """Where cells and walls begin and end in turn, shape (2 cells,); the last ends at the size."""
+    corridor = (size - (cells - 1) * wall) / cells
+    edges = np.arange(cells)[:, None] * (corridor + wall) + [0, corridor]
+    edges[-1, 1] = size
+    return edges.ravel()
+
+
+def _check_wall(size: float, cells: int, wall: float) -> None:
+    most = size / (cells - 1) if cells > 1 else size
+    if wall >= most:
+        raise BrrtError(f"wall {wall:g} leaves no room for {cells} cells; make it below {most:g}")
+
+
+@dataclass(frozen=True, slots=True)
+class Maze(Seeded):
+    """A perfect maze: exactly one way leads from any cell to any other.
+
+    Start and goal stand in the middle of opposite corner cells.
+    """
+
+    cells: int = param(10, "cells along each side", low=2, high=300)
+    corridor: float | None = param(
+        None, "width of the corridors; auto: what the walls leave", above=0
+    )
+    wall: float | None = param(
+        None, "thickness of the walls; auto: what the corridors leave, or a tenth", above=0
+    )
+
+    def __post_init__(self) -> None:
+        """Check that corridors and walls fit the map."""
+        Seeded.__post_init__(self)
+        if self.corridor is not None and self.wall is not None:
+            raise BrrtError("size, cells and either of corridor and wall say the other; give one")
+        if self.corridor is not None and self.corridor * self.cells >= self.size:
+            raise BrrtError(
+                f"corridor {self.corridor:g} leaves no room for walls between {self.cells} cells; "
+                f"make it below {self.size / self.cells:g}"
+            )
+        _check_wall(self.size, self.cells, self.thickness)
+
+    @property
+    def thickness(self) -> float:
+        """Of the walls."""
+        if self.corridor is not None:
+            return (self.size - self.cells * self.corridor) / (self.cells - 1)
+        return _WALL * self.size / self.cells if self.wall is None else self.wall
+
+    def ends(self, _room: float, /) -> tuple[Floats, Floats]:
+        """Return the middle of two opposite corner cells."""
+        edges = _edges(self.size, self.cells, self.thickness)
+        first, last = edges[:2].mean(), edges[-2:].mean()
+        return np.full(self.dim, first), np.full(self.dim, last)
+
+    def scenery(self, rng: np.random.Generator, _ends: Ends, /) -> Scenery:
+        """Draw the ways between cells, and wall off the rest."""
+        shape = (self.cells,) * self.dim
+        edges = _edges(self.size, self.cells, self.thickness)
+        return Scenery(boxes=walls_of(shape, spanning_tree(shape, rng), edges))
+
+
+@dataclass(frozen=True, slots=True)
+class Maze2D(Maze):
+    """A perfect maze on a square map: exactly one way leads from any cell to any other."""
+
+    dim: ClassVar[int] = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Maze3D(Maze):
+    """A perfect maze in a cube, with ways up and down as well."""
+
+    dim: ClassVar[int] = 3
+
+    cells: int = param(5, "cells along each side", low=2, high=40)
+
+
+@dataclass(frozen=True, slots=True)
+class Rooms2D(Seeded):
+    """Rooms in rows, with doors at random places in the walls between them.
+
+    Doors join all the rooms; some of the other walls have one too. Start and goal stand in the
+    middle of opposite corner rooms.
+    """
+
+    dim: ClassVar[int] = 2
+
+    rooms: int = param(4, "rooms along each side", low=1, high=100)
+    door: float | None = param(None, "width of the doors; auto: 0.3 of a room", above=0)
+    wall: float | None = param(
+        None, "thickness of the walls; auto: 0.1 of a room with its wall", above=0
+    )
+    loops: float = param(0.3, "share of the walls that need no door and have one", low=0, high=1)
+
+    def __post_init__(self) -> None:
+        """Check that doors and walls fit."""
+        Seeded.__post_init__(self)
+        _check_wall(self.size, self.rooms, self.thickness)
+        if self.width > self.side:
+            raise BrrtError(f"door {self.width:g} does not fit; a room's side is {self.side:g}")
+
+    @property
+    def thickness(self) -> float:
+        """Of the walls."""
+        return _WALL * self.size / self.rooms if self.wall is None else self.wall
+
+    @property
+    def side(self) -> float:
+        """Of a room."""
+        return (self.size - (self.rooms - 1) * self.thickness) / self.rooms
+
+    @property
+    def width(self) -> float:
+        """Of the doors."""
+        return 0.3 * self.side if self.door is None else self.door
+
+    def ends(self, _room: float, /) -> tuple[Floats, Floats]:
+        """Return the middle of two opposite corner rooms."""
+        return np.full(2, self.side / 2), np.full(2, self.size - self.side / 2)
+
+    def scenery(self, rng: np.random.Generator, _ends: Ends, /) -> Scenery:
+        """Draw which walls have doors and where, and build what is left of them."""
+        shape = (self.rooms, self.rooms)
+        open_ = np.zeros((2, self.rooms, self.rooms), np.bool_)
+        x, y = np.unravel_index(np.sort(spanning_tree(shape, rng), axis=1).T, shape)
+        open_[np.where(x[1] > x[0], 0, 1), x[0], y[0]] = True
+        open_ |= rng.random(open_.shape) < self.loops
+        places = rng.random(open_.shape)
+        walls = [self._wall(0, i, open_[0, i], places[0, i]) for i in range(self.rooms - 1)]
+        walls += [self._wall(1, i, open_[1, :, i], places[1, :, i]) for i in range(self.rooms - 1)]
+        return Scenery(boxes=np.concatenate([np.empty((0, 4)), *walls]))
+
+    def _wall(self, axis: int, i: int, open_: NDArray[np.bool_], places: Floats) -> Floats:
+        """Return the wall behind the rooms of row i, across the map, but for its doors."""
+        pitch = self.side + self.thickness
+        doors = np.arange(self.rooms) * pitch + places * (self.side - self.width)
+        doors = doors[open_]
+        begin = np.append(0.0, doors + self.width)
+        end = np.append(doors, self.size)
+        near = np.full(len(begin), i * pitch + self.side)
+        along, across = (begin, end), (near, near + self.thickness)
+        (x0, x1), (y0, y1) = (across, along) if axis == 0 else (along, across)
+        return np.stack([x0, y0, x1, y1], axis=1)[begin < end]
+
+
+@dataclass(frozen=True, slots=True)
+class Spiral2D(Fixed):
+    """One corridor that winds from a corner of a square map to its middle."""
+
+    dim: ClassVar[int] = 2
+
+    turns: int = param(3, "times that the corridor goes around the middle", low=1, high=100)
+    wall: float | None = param(
+        None, "thickness of the walls; auto: 0.1 of a corridor with its wall", above=0
+    )
+
+    def __post_init__(self) -> None:
+        """Check that the walls fit the map."""
+        Fixed.__post_init__(self)
+        _check_wall(self.size, self.cells, self.thickness)
+
+    @property
+    def cells(self) -> int:
+        """Widths of the corridor across the map, with the middle."""
+        return 2 * self.turns + 1
+
+    @property
+    def thickness(self) -> float:
+        """Of the walls."""
+        return _WALL * self.size / self.cells if self.wall is None else self.wall
+
+    def ends(self, _room: float, /) -> tuple[Floats, Floats]:
+        """Return the middle of the corridor where it begins, and of the map."""
+        first = _edges(self.size, self.cells, self.thickness)[:2].mean()
+        return np.full(2, first), np.full(2, self.size / 2)
+
+    def layout(self) -> Scenery:
+        """Walk inwards along the cells that were not visited, always turning left."""
+        shape = (self.cells, self.cells)
+        left = np.arange(self.cells**2).reshape(shape)
+        way = []
+        while left.size:
+            way.append(left[:, 0])
+            left = np.rot90(left[:, 1:], -1)
+        cells = np.concatenate(way)
+        pairs = np.stack([cells[:-1], cells[1:]], axis=1)
+        edges = _edges(self.size, self.cells, self.thickness)
+        return Scenery(boxes=walls_of(shape, pairs, edges))
