@@ -16,7 +16,7 @@ from brrt.planners.shortcut import Shortcut
 from brrt.planners.stop import Stop
 from brrt.problem import Problem, random_configuration
 from brrt.robots import Robot, make_robot, names_robot_file, robot_from_json
-from brrt.worlds import World, make_world
+from brrt.worlds import World, make_world, world_beside
 
 RANDOM: Literal["random"] = "random"
 """A start or goal that the scenario's seed decides."""
@@ -140,10 +140,11 @@ class Scenario:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise BrrtError(f"{path}: not TOML: {error}") from None
         # A map or a robot named in the file is looked for beside it first.
-        for name in ("world", "robot"):
-            beside = values.get(name)
-            if isinstance(beside, str) and (path.parent / beside).is_file():
-                values[name] = str(path.parent / beside)
+        world, robot = values.get("world"), values.get("robot")
+        if isinstance(world, str):
+            values["world"] = world_beside(path.parent, world)
+        if isinstance(robot, str) and (path.parent / robot).is_file():
+            values["robot"] = str(path.parent / robot)
         try:
             return cls.parse(values)
         except BrrtError as error:

@@ -378,7 +378,7 @@ def test_only_one_end_given(name: str) -> None:
         ("nothing", "unknown world 'nothing'; there is: boxes2d, boxes3d, bugtrap2d"),
         ("maps/none.txt", "maps/none.txt: No such file"),
         ("maps/none", "maps/none: no such file"),
-        ("none.yaml", "none.yaml: no such file"),
+        ("none.zip", "none.zip: no such file"),
     ],
 )
 def test_wrong_specifications(spec: str, message: str) -> None:

@@ -301,13 +301,13 @@ def test_binary_file(name: str, tmp_path: Path) -> None:
     assert refused(lambda: load_world(path)) == f"{path}: not a text file"
 
 
-@pytest.mark.parametrize("name", ["map.png", "map", "map.TXT.gz"])
+@pytest.mark.parametrize("name", ["map.zip", "map", "map.TXT.gz"])
 def test_foreign_file(name: str, tmp_path: Path) -> None:
     """A file of another kind is refused, and the message says which kinds there are."""
     path = tmp_path / name
-    path.write_text("boundary 0 0 0 1 1 1")
+    path.write_text("wall 0 0 0 1 1 1")
     error = refused(lambda: make_world(str(path)))
-    assert error == f"{path}: not a world that brrt reads; it reads .json, .map, .txt"
+    assert error.startswith(f"{path}: not a world that brrt reads; it reads .json, .txt, .map, ")
 
 
 @pytest.mark.parametrize("name", ["folder.txt", "folder.json"])

@@ -1,16 +1,16 @@
-"""Worlds: a generator is one class and one line here, a file format one function and one line."""
+"""Worlds: a generator is one class and one line here, and so is a file format."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
-from brrt.files import read_text
+from brrt.files import is_file, is_there, read_bytes
 from brrt.settings import pairs
-from brrt.worlds.blocks import load_blocks
 from brrt.worlds.generators.courses import (
     Cube3D,
     Hurdles3D,
@@ -43,7 +43,14 @@ from brrt.worlds.generators.walls import (
     Walls2D,
     Walls3D,
 )
-from brrt.worlds.movingai import load_grid
+from brrt.worlds.loaders.blocks import Blocks
+from brrt.worlds.loaders.geojson import GeoJson
+from brrt.worlds.loaders.image import ImageMap
+from brrt.worlds.loaders.json_world import JsonWorld
+from brrt.worlds.loaders.loader import FileSpec, Loader
+from brrt.worlds.loaders.movingai import GridMap, Scenarios
+from brrt.worlds.loaders.ompl import Circles
+from brrt.worlds.loaders.ros import RosMap
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
@@ -80,14 +87,20 @@ GENERATORS: Mapping[str, type[Generator]] = {
     "offset3d": Offset3D,
 }
 
-LOADERS: Mapping[str, Callable[[Path, str], World]] = {
-    ".json": lambda path, text: _named(str(path), World.from_json(text)),
-    ".map": load_grid,
-    ".txt": load_blocks,
+LOADERS: Mapping[str, type[Loader]] = {
+    "brrt": JsonWorld,
+    "blocks": Blocks,
+    "circles": Circles,
+    "movingai": GridMap,
+    "scenarios": Scenarios,
+    "ros": RosMap,
+    "image": ImageMap,
+    "geojson": GeoJson,
 }
-"""Readers of world files by the file's ending."""
+"""By name; of those with the same ending, the first takes what none recognises."""
 
-_MAX_BYTES = 256_000_000
+_HEAD = 65_536
+"""Bytes that show what a file is."""
 
 
 def make_world(
@@ -111,27 +124,38 @@ def make_world(
     if name in GENERATORS:
         settings = GENERATORS[name].parse(f"world {name}", pairs(f"world {spec}", rest))
         return settings.make(spec, start, goal, room)
-    path = Path(spec)
+    path, params, query = FileSpec.parse(spec)
     if not spec:
         raise unknown("world", spec, GENERATORS)
-    if path.suffix in LOADERS or path.exists():
-        return load_world(path)
-    if "/" in spec or path.suffix:
-        raise BrrtError(f"{spec}: no such file")
+    if is_there(path) or _of_ending(path):
+        world = load_world(path, pairs(f"world {spec}", params), query)
+        return replace(world, name=spec) if params or query else world
+    if "/" in str(path) or path.suffix:
+        raise BrrtError(f"{path}: no such file")
     raise unknown("world", name, GENERATORS)
 
 
-def load_world(path: Path) -> World:
+def world_beside(folder: Path, spec: str) -> str:
+    """Return the specification of a file that lies in a folder, if it does, or else as it is."""
+    beside = str(folder / spec)
+    there = spec.partition(":")[0] not in GENERATORS and is_file(FileSpec.parse(beside).path)
+    return beside if there else spec
+
+
+def load_world(path: Path, params: Mapping[str, Any] | None = None, query: str = "") -> World:
     """Read a world from a file.
+
+    Args:
+        path: The file; its ending and what it begins with choose the loader.
+        params: Settings of the loader.
+        query: Which start and goal, of a file that has several.
 
     Raises:
         BrrtError: The file cannot be read, or is not a world.
     """
-    if path.suffix not in LOADERS:
-        raise BrrtError(f"{path}: not a world that brrt reads; it reads {', '.join(LOADERS)}")
-    text = read_text(path, "a world", _MAX_BYTES)
     try:
-        return LOADERS[path.suffix](path, text)
+        name, loader = _loader(path)
+        return loader.parse(f"loader {name}", params or {}).load(path, query)
     except BrrtError as error:
         message = str(error)
         raise BrrtError(
@@ -139,8 +163,39 @@ def load_world(path: Path) -> World:
         ) from None
 
 
-def _named(name: str, world: World) -> World:
-    return replace(world, name=name)
+def _loader(path: Path) -> tuple[str, type[Loader]]:
+    """Choose by the ending and, where that does not decide, by content."""
+    named = _of_ending(path)
+    if len(named) == 1:
+        return named[0]
+    if is_there(path) and not is_file(path):
+        raise BrrtError(f"{path}: not a file whose beginning tells what it is; {_READS}")
+    head = read_bytes(path, "a world", _HEAD, rest=False)
+    for name, loader in named or LOADERS.items():
+        if loader.recognises(head):
+            return name, loader
+    if named:
+        return named[0]
+    raise BrrtError(f"{path}: not a world that brrt reads; {_READS}")
 
 
-__all__ = ["GENERATORS", "LOADERS", "Generator", "Grid", "World", "load_world", "make_world"]
+def _of_ending(path: Path) -> list[tuple[str, type[Loader]]]:
+    ending = path.suffix.lower()
+    return [(name, loader) for name, loader in LOADERS.items() if ending in loader.endings]
+
+
+_READS = "it reads " + ", ".join(
+    dict.fromkeys(ending for loader in LOADERS.values() for ending in loader.endings)
+)
+
+__all__ = [
+    "GENERATORS",
+    "LOADERS",
+    "Generator",
+    "Grid",
+    "Loader",
+    "World",
+    "load_world",
+    "make_world",
+    "world_beside",
+]

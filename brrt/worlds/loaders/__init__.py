@@ -1,0 +1,1 @@
+"""Loaders: one file a format; the registry is `brrt.worlds.LOADERS`."""

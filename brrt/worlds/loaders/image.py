@@ -1,0 +1,48 @@
+"""Plain images as grid maps."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from brrt.settings import param
+from brrt.worlds.loaders.loader import Loader, nothing_to_choose
+from brrt.worlds.loaders.pixels import ENDINGS, MAGIC, read_pixels
+from brrt.worlds.occupancy import Grid
+from brrt.worlds.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class ImageMap(Loader):
+    """2D maps drawn in a PNG, PGM, PBM, PPM, BMP or JPEG: dark pixels are blocked.
+
+    The lowest row of pixels lies at y = 0, the leftmost column at x = 0. Transparent pixels are
+    free, and half-transparent ones stand on a free background.
+    """
+
+    threshold: float = param(0.5, "what is darker is blocked; 0 is black, 1 white", above=0, high=1)
+    resolution: float = param(1.0, "side of a pixel", above=0, unit="m")
+    invert: bool = param(False, "light pixels are blocked, and dark ones free")
+
+    endings = ENDINGS
+
+    @classmethod
+    def recognises(cls, head: bytes) -> bool:
+        """Whether it begins as these images do."""
+        return head.startswith(MAGIC)
+
+    def load(self, path: Path, query: str) -> World:
+        """Read a map.
+
+        Raises:
+            BrrtError: The image is missing, broken or too large.
+        """
+        nothing_to_choose(path, query)
+        pixels = read_pixels(path)
+        free = pixels.white - pixels.grey if self.invert else pixels.grey
+        blocked = free < self.threshold * pixels.white
+        if pixels.alpha is not None:
+            over = free * pixels.alpha.astype(np.uint16) + np.uint16(255) * (255 - pixels.alpha)
+            blocked = over < self.threshold * 255 * 255
+        cells = np.ascontiguousarray(blocked[::-1])
+        return World.of_grid(str(path), Grid(cells, np.zeros(2), self.resolution))

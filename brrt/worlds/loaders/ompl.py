@@ -1,0 +1,141 @@
+"""Circles and queries of OMPL's planar tests (`Circles2D.h` there)."""
+
+import re
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+from brrt.files import is_file, lines_of, read_text
+from brrt.settings import param
+from brrt.worlds.loaders.loader import (
+    MOST_BYTES,
+    Loader,
+    finite,
+    named_by_user,
+    nothing_to_choose,
+    whole,
+)
+from brrt.worlds.world import World
+
+_CIRCLES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+(?:units:|x\s+y\s+r\b)")
+_QUERIES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+\d+\s++(?:start|goal):")
+_MOST = 10**9
+
+
+@dataclass(frozen=True, slots=True)
+class Circles(Loader):
+    """2D circles of OMPL's tests: rows `i x y r`; a file of queries takes the circles beside it.
+
+    The bounds are those of the circles, as in OMPL. `circle_queries.txt#7` is query 7, with the
+    circles of `circle_obstacles.txt`.
+    """
+
+    margin: float = param(0.0, "room between the outermost circles and the bounds", low=0)
+    obstacles: str | None = param(None, "the circles of queries, where they are not beside them")
+
+    endings = (".txt",)
+    queries = "a query by its number (7), in a file of queries"
+
+    @classmethod
+    def recognises(cls, head: bytes) -> bool:
+        """Whether it begins with `units:`, with the header `x y r`, or with a query."""
+        return bool(_CIRCLES.match(head) or _QUERIES.match(head))
+
+    def load(self, path: Path, query: str) -> World:
+        """Read circles and, from a file of queries, start and goal.
+
+        Raises:
+            BrrtError: A line is wrong, there is no such query, or it lies outside the bounds.
+        """
+        text = read_text(path, "a world", MOST_BYTES)
+        if _QUERIES.match(text[:4096].encode()) is None:
+            nothing_to_choose(path, query)
+            return self._world(path, _circles(str(path), text), None, ())
+        number, ends, count = _query(path, text, query)
+        notes = [] if query else [f"{path}: query {number} of {count:,}; name one as {path.name}#7"]
+        source = self._obstacles(path)
+        circles = _circles(str(source), read_text(source, "a world", MOST_BYTES))
+        return self._world(path, circles, ends, tuple(notes))
+
+    def _world(
+        self,
+        path: Path,
+        circles: NDArray[np.float64],
+        ends: NDArray[np.float64] | None,
+        notes: tuple[str, ...],
+    ) -> World:
+        lower = (circles[:, :2] - circles[:, 2:]).min(axis=0) - self.margin
+        upper = (circles[:, :2] + circles[:, 2:]).max(axis=0) + self.margin
+        if not (lower < upper).all():
+            raise BrrtError(f"{path}: the circles span no area; give room: {path.name}:margin=1")
+        start, goal = (None, None) if ends is None else ends
+        for what, end in (("start", start), ("goal", goal)):
+            if end is not None and not ((lower <= end) & (end <= upper)).all():
+                raise BrrtError(
+                    f"{path}: the {what} {end[0]:g}, {end[1]:g} lies outside the bounds of the "
+                    f"circles; give room: {path.name}:margin=10"
+                )
+        return World(str(path), lower, upper, balls=circles, start=start, goal=goal, notes=notes)
+
+    def _obstacles(self, path: Path) -> Path:
+        if self.obstacles is not None:
+            return named_by_user(path, self.obstacles)
+        beside = path.with_name(path.name.replace("queries", "obstacles"))
+        if beside == path or not is_file(beside):
+            raise BrrtError(
+                f"{path}: these are queries, and their circles are not in {beside.name} beside "
+                f"them; say where: {path.name}:obstacles=PATH"
+            )
+        return beside
+
+
+def _circles(name: str, text: str) -> NDArray[np.float64]:
+    """Read rows of number, x, y and radius below the unit and the header."""
+    numbers = array("d")
+    for number, line in lines_of(name, text):
+        words = line.split()
+        if not words or words[0] == "units:" or (words == ["x", "y", "r"] and not numbers):
+            continue
+        where = f"{name}:{number}"
+        if len(words) != 4:
+            raise BrrtError(f"{where}: {len(words)} words; there must be 4: number, x, y, radius")
+        x, y, radius = finite(where, words)[1:]
+        if radius < 0:
+            raise BrrtError(f"{where}: the radius {radius:g} is below zero")
+        numbers.extend((x, y, radius))
+    if not numbers:
+        raise BrrtError(f"{name}: no circles; each is a line of number, x, y, radius")
+    return np.array(numbers).reshape(-1, 3)
+
+
+def _query(path: Path, text: str, query: str) -> tuple[int, NDArray[np.float64], int]:
+    """Find a query: its number, start and goal, shape (2, 2), and how many there are."""
+    wanted = whole(f"{path}#{query[:40]}", "a query", query, 0, _MOST) if query else None
+    found: dict[str, list[float]] = {}
+    count = 0
+    for where, number, what, words in _ends(path, text):
+        count += what == "goal"
+        wanted = number if wanted is None else wanted
+        if number == wanted:
+            if what in found:
+                raise BrrtError(f"{where}: a second {what} of query {number}")
+            found[what] = finite(where, words)
+    if wanted is None or len(found) < 2:
+        there = f"there are {count:,}" if not found else f"it has {' '.join(found)} alone"
+        raise BrrtError(f"{path}: no query {wanted}; {there}")
+    return wanted, np.array([found["start"], found["goal"]]), count
+
+
+def _ends(path: Path, text: str) -> Iterator[tuple[str, int, str, list[str]]]:
+    for line_number, line in lines_of(str(path), text):
+        words = line.split()
+        where = f"{path}:{line_number}"
+        if words and (len(words) != 4 or words[1] not in ("start:", "goal:")):
+            raise BrrtError(f"{where}: a line must read 'NUMBER start: X Y' or 'NUMBER goal: X Y'")
+        if words:
+            yield where, whole(where, "a query", words[0], 0, _MOST), words[1][:-1], words[2:]

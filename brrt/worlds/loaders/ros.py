@@ -1,0 +1,165 @@
+"""Maps of ROS's map_server: a yaml that describes an image (nav2's `map_io.cpp`)."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+from brrt.files import is_file
+from brrt.settings import param
+from brrt.worlds.loaders.loader import Loader, named_by_user, named_inside, nothing_to_choose
+from brrt.worlds.loaders.pixels import Pixels, look_up, read_pixels
+from brrt.worlds.occupancy import Grid
+from brrt.worlds.world import World
+
+if TYPE_CHECKING:
+    from brrt.worlds.loaders.fields import Fields
+
+_MOST_BYTES = 64_000
+"""Real ones have 200."""
+
+_NEEDED = ("image", "resolution", "origin", "occupied_thresh", "free_thresh", "negate")
+_MODES = ("trinary", "scale", "raw")
+_TRUTH = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
+_OCCUPIED, _UNKNOWN = 100, -1
+
+
+@dataclass(frozen=True, slots=True)
+class RosMap(Loader):
+    """2D maps of ROS's map_server: a yaml beside its PGM or PNG; modes trinary, scale and raw.
+
+    As nav2 reads them: a pixel's occupancy is its darkness (its lightness with `negate`); cells
+    at or above `occupied_thresh` are occupied (100), those at or below `free_thresh` free (0),
+    transparent ones unknown; those between are unknown too or, in mode `scale`, 1 to 99. In mode
+    `raw` the pixel's value is its occupancy, and values above 100 are unknown.
+    """
+
+    unknown: Literal["blocked", "free"] = param("blocked", "how unknown cells count")
+    occupied: float = param(
+        50.0, "cells from here on are blocked", above=0, high=100, unit="% occupied"
+    )
+    image: str | None = param(None, "the image, where it is not the one that the yaml names")
+
+    endings = (".yaml", ".yml")
+
+    @classmethod
+    def recognises(cls, head: bytes) -> bool:
+        """Whether it names an image and a resolution."""
+        return all(
+            re.search(rb"^\s*" + field + rb"\s*:", head, re.MULTILINE)
+            for field in (b"image", b"resolution")
+        )
+
+    def load(self, path: Path, query: str) -> World:
+        """Read a map and its image.
+
+        Raises:
+            BrrtError: A field is missing or of no use, or so is the image.
+        """
+        from brrt.worlds.loaders.fields import Fields  # noqa: PLC0415 - yaml is slow to import
+
+        nothing_to_choose(path, query)
+        fields = Fields.read(path, _MOST_BYTES)
+        for name in _NEEDED:
+            if name not in fields.nodes:
+                raise BrrtError(f"{path}: the field {name!r} is missing; a map has one")
+        resolution = fields.number("resolution")
+        if resolution <= 0:
+            raise BrrtError(f"{fields.where('resolution')} must be above 0, not {resolution:g}")
+        x, y, yaw = fields.numbers("origin", "x, y, yaw")
+        mode, negate, (occupied, free) = _mode(fields), _negate(fields), _thresholds(fields)
+        values = occupancy(self._pixels(path, fields), mode, occupied, free, negate=negate)
+        dark = values == _UNKNOWN
+        blocked = values >= self.occupied
+        if self.unknown == "blocked":
+            blocked |= dark
+        grid = Grid(np.ascontiguousarray(blocked[::-1]), np.array([x, y]), resolution, yaw)
+        notes = self._notes(path, fields, int(dark.sum()), dark.size)
+        return World.of_grid(str(path), grid, notes=tuple(notes))
+
+    def _notes(self, path: Path, fields: "Fields", dark: int, cells: int) -> Iterator[str]:
+        for name in fields.nodes:
+            if name not in (*_NEEDED, "mode"):
+                yield f"{fields.where(name[:40])}: no field of a map; left out"
+        if dark:
+            other = "free" if self.unknown == "blocked" else "blocked"
+            yield (
+                f"{path}: {dark:,} of {cells:,} cells are unknown and count as {self.unknown}; "
+                f"{path.name}:unknown={other} makes them {other}"
+            )
+
+    def _pixels(self, path: Path, fields: "Fields") -> Pixels:
+        if self.image is not None:
+            return read_pixels(named_by_user(path, self.image))
+        where, name = fields.where("image"), fields.text("image")
+        remedy = f"{path.name}:image=PATH"
+        image = named_inside(where, path, name, remedy)
+        if not name or not is_file(image):
+            raise BrrtError(f"{where}: there is no image {name[:80]!r} here; say where: {remedy}")
+        return read_pixels(image)
+
+
+def occupancy(
+    pixels: Pixels, mode: str, occupied: float, free: float, *, negate: bool
+) -> NDArray[np.int8]:
+    """Return what a map server publishes: 0 to 100, or -1 where it is unknown.
+
+    Args:
+        pixels: The image.
+        mode: `trinary`, `scale` or `raw`.
+        occupied: Darkness from which on a cell is occupied, 0 to 1.
+        free: Darkness up to which a cell is free, below `occupied`.
+        negate: Lightness counts instead of darkness; not in mode raw.
+
+    Returns:
+        Shape (h, w), the image's top row first.
+    """
+    codes = np.arange(pixels.white + 1)
+    dark = (codes if negate else pixels.white - codes) / pixels.white
+    if mode == "raw":
+        value = np.floor(codes / pixels.white * 255 + 0.5)
+        value[value > _OCCUPIED] = _UNKNOWN
+    else:
+        between = np.floor((dark - free) / (occupied - free) * 100 + 0.5)
+        value = between if mode == "scale" else np.full(len(codes), float(_UNKNOWN))
+        value[dark >= occupied] = _OCCUPIED
+        value[dark <= free] = 0
+    values = look_up(value.astype(np.int8), pixels.grey)
+    if pixels.alpha is not None and mode != "raw":
+        values[pixels.alpha < 255] = _UNKNOWN
+    return values
+
+
+def _thresholds(fields: "Fields") -> tuple[float, float]:
+    """Return the occupied and the free threshold."""
+    occupied, free = fields.number("occupied_thresh"), fields.number("free_thresh")
+    for name, value in (("occupied_thresh", occupied), ("free_thresh", free)):
+        if not 0 <= value <= 1:
+            raise BrrtError(f"{fields.where(name)} must be from 0 to 1, not {value:g}")
+    if free >= occupied:
+        raise BrrtError(
+            f"{fields.where('free_thresh')} {free:g} must be below occupied_thresh {occupied:g}"
+        )
+    return occupied, free
+
+
+def _negate(fields: "Fields") -> bool:
+    word = fields.text("negate").lower()
+    if word not in _TRUTH:
+        raise BrrtError(f"{fields.where('negate')} must be 0 or 1, not {word[:40]!r}")
+    return _TRUTH[word]
+
+
+def _mode(fields: "Fields") -> str:
+    mode = fields.text("mode") if "mode" in fields.nodes else "trinary"
+    if mode not in _MODES:
+        raise BrrtError(
+            f"{fields.where('mode')} must be {', '.join(_MODES[:-1])} or {_MODES[-1]}, "
+            f"not {mode[:40]!r}"
+        )
+    return mode
