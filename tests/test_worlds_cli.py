@@ -42,7 +42,7 @@ def hand_made(**changes: Any) -> World:
         "boxes": np.array([[1.0, 7, 4, 8], [5, 7, 5.05, 11]]),
         "polygons": (np.array([[7.0, 7], [11, 7.5], [8, 10]]), np.array([[4.0, 9], [6, 11]])),
         "start": np.array([1.5, 5.5]),
-        "goal": np.array([11.0, 5]),
+        "goal": np.array([11.0, 2.5]),
     }
     return World(**{**parts, **changes})
 
