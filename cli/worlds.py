@@ -13,10 +13,7 @@ from .lists import Json, described, print_described
 if TYPE_CHECKING:
     from brrt.worlds import World
 
-app = typer.Typer(
-    help="List the world generators, show a world, or save one.",
-    invoke_without_command=True,
-)
+app = typer.Typer(invoke_without_command=True)
 Named = Annotated[
     str,
     typer.Argument(
@@ -141,9 +138,10 @@ def show(
     out.print(drawing, soft_wrap=True)
     print_pairs(_rows(figures))
     if picture is not None:
-        out.print(f"\n{picture}: the picture", markup=False)
+        out.print(f"\n{picture}: the picture", markup=False, soft_wrap=True)
     if rrd is not None:
-        out.print(f"{rrd}: look at it with [bold]rerun {escape(str(rrd))}[/bold]")
+        name = escape(str(rrd))
+        out.print(f"\n{name}: look at it with [bold]rerun {name}[/bold]", soft_wrap=True)
 
 
 @app.command()
@@ -168,7 +166,8 @@ def make(
         made = _made(world, start, goal)
         made.save(file)
     what = ", ".join(_counts(_figures(made))) or "no obstacles"
-    out.print(f"{file}: {made.dim}D, {what}; plan in it with --world {file}", markup=False)
+    text = f"{file}: {made.dim}D, {what}; plan in it with --world {file}"
+    out.print(text, markup=False, soft_wrap=True)
 
 
 def _made(spec: str, start: str | None, goal: str | None) -> "World":

@@ -350,6 +350,16 @@ def test_a_file_is_never_half_written(brrt: Command, monkeypatch: pytest.MonkeyP
     assert Path("w.json").read_bytes() == before
 
 
+def test_names_are_printed_as_they_are(brrt: Command) -> None:
+    """Brackets are no markup, and a long name is not broken."""
+    name = "[bold]" + 100 * "x"
+    done = brrt("worlds", "make", "circles2d", "--out", f"{name}.json")
+    assert done.out.count(f"{name}.json") == 2
+    done = brrt("worlds", "show", f"{name}.json", "--out", f"{name}.png", "--rrd", f"{name}.rrd")
+    assert f"{name}.png: the picture" in done.out
+    assert done.out.count(f"{name}.rrd") == 2
+
+
 # Bad input
 
 
