@@ -9,6 +9,7 @@ from enum import IntEnum
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
@@ -49,7 +50,7 @@ def print_rows(
     for i, name in enumerate(rows[0]):
         table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < whole)
     for row in rows:
-        table.add_row(*(row[name] for name in row))
+        table.add_row(*(escape(row[name]) for name in row))
     out.print(table)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
 from brrt.files import replacing
+from brrt.settings import pairs
 from brrt.worlds.convex import GREATEST, convex_polygon, gap
 from brrt.worlds.occupancy import Grid
 
@@ -264,15 +265,22 @@ class World:
         return cls(str(data.get("name", "")), **found)
 
     @classmethod
-    def load(cls, path: Path | str) -> "World":
-        """Read a world from a file of any kind that brrt knows.
+    def load(cls, path: Path | str, query: str = "", **parameters: Any) -> "World":
+        """Read a world from a file of any kind that brrt knows; see `brrt worlds list`.
+
+        Args:
+            path: The file, or what the command line takes, as `map.yaml:unknown=free`.
+            query: Which start and goal, of a file that has several, such as "12".
+            parameters: Settings of the loader.
 
         Raises:
             BrrtError: The file cannot be read, or is not a world.
         """
-        from brrt.worlds import load_world  # noqa: PLC0415 - it imports this module
+        from brrt.worlds import FileSpec, load_world  # noqa: PLC0415 - it imports this module
 
-        return load_world(Path(path))
+        spec = FileSpec.parse(str(path))
+        given = pairs(f"world {path}", spec.params)
+        return load_world(spec.path, {**given, **parameters}, query or spec.query)
 
     @classmethod
     def generate(cls, generator: str, **parameters: Any) -> "World":
