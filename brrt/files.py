@@ -1,8 +1,9 @@
-"""Files that users give us: read whole, or refused in one line."""
+"""Files: read whole or refused in one line, and what we write is never half there."""
 
 import os
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from brrt.errors import BrrtError
@@ -80,3 +81,23 @@ def lines_of(name: str, text: str) -> Iterator[tuple[int, str]]:
                 f"{name}:{number}: {end - start:,} characters; a line has at most {LONGEST_LINE:,}"
             )
         yield number, match[1]
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write a file elsewhere; it takes its name, and any older file's place, once it is whole.
+
+    Yields:
+        The name to write to, in the same folder and with the same ending.
+
+    Raises:
+        BrrtError: The file cannot be written.
+    """
+    unfinished = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+    try:
+        yield unfinished
+        unfinished.replace(path)
+    except OSError as error:
+        raise BrrtError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        unfinished.unlink(missing_ok=True)

@@ -19,6 +19,7 @@ from brrt.problem import Problem
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest, Scenario
 from brrt.settings import Settings
+from brrt.worlds.world import World
 
 _SWITCH_S = 0.0005
 
@@ -47,6 +48,8 @@ class Run:
 
     Args:
         scenario: What to run.
+        world: A world at hand, as one made by hand; the scenario's `world` is then its name in the
+            log. By default the scenario makes its own.
         planner: A planner of your own, any object with `Planner.solve`; the scenario's `planner`
             is then its name in the log. By default the registered one of that name.
         batch: Events in a batch at most; the log does not depend on it.
@@ -56,12 +59,19 @@ class Run:
     """
 
     def __init__(
-        self, scenario: Scenario, *, planner: Solver | None = None, batch: int = 8192
+        self,
+        scenario: Scenario,
+        *,
+        world: World | None = None,
+        planner: Solver | None = None,
+        batch: int = 8192,
     ) -> None:
+        if world is not None:
+            scenario = replace(scenario, world=world.name)
         if planner is not None:
             scenario = _named(scenario, planner)
         self._planner = scenario.make_planner() if planner is None else planner
-        self.problem, self._smoother = scenario.make_problem(), scenario.make_smoother()
+        self.problem, self._smoother = scenario.make_problem(world), scenario.make_smoother()
         self._execute = scenario.make_execute()
         self._compile()
         self._log = EventLog(self.problem.dof, batch, logical_clock=scenario.clock == "logical")

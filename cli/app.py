@@ -6,10 +6,11 @@ from collections.abc import Sequence
 import typer
 
 from .console import Code, complain
-from .lists import planners, robots, worlds
+from .lists import planners, robots
 from .plan import plan
 from .replay import replay
 from .verify import verify
+from .worlds import app as worlds
 
 app = typer.Typer(
     name="brrt",
@@ -39,7 +40,7 @@ app.command()(replay)
 app.command()(verify)
 app.command()(planners)
 app.command()(robots)
-app.command()(worlds)
+app.add_typer(worlds, name="worlds")
 
 
 @app.callback(invoke_without_command=True)

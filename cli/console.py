@@ -3,14 +3,16 @@
 import json
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
@@ -40,24 +42,34 @@ def print_json(data: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
 
 
-def print_rows(rows: Sequence[Mapping[str, str]], title: str | None = None) -> None:
-    """Print a table of rows with the same keys."""
+def print_rows(
+    rows: Sequence[Mapping[str, str]], title: str | None = None, *, whole: int = 2
+) -> None:
+    """Print a table of rows with the same keys; the first `whole` columns are not wrapped."""
     table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
     for i, name in enumerate(rows[0]):
-        table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < 2)
+        table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < whole)
     for row in rows:
-        table.add_row(*(row[name] for name in row))
+        table.add_row(*(escape(row[name]) for name in row))
     out.print(table)
 
 
 def print_summary(figures: Mapping[str, Any]) -> None:
     """Print a run's figures for people."""
+    outcomes = {"solved": "bold green", "not solved": "bold red"}
+    print_pairs(
+        (name, text, outcomes.get(text.split(",")[0], "") if name == "outcome" else "")
+        for name, text in _summary(figures)
+    )
+
+
+def print_pairs(rows: Iterable[tuple[str, str, str]]) -> None:
+    """Print names with what there is to say about them; the third is a style."""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim")
     table.add_column(overflow="fold")
-    for name, text in _summary(figures):
-        style = {"solved": "bold green", "not solved": "bold red"}.get(text.split(",")[0], "")
-        table.add_row(name, text, style=style if name == "outcome" else "")
+    for name, text, style in rows:
+        table.add_row(name, Text(text), style=style)
     out.print(table)
 
 

@@ -1,8 +1,9 @@
-"""`brrt planners`, `brrt robots`, `brrt worlds`: what there is, and what can be set."""
+"""`brrt planners`, `brrt robots`: what there is, and what can be set."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from .console import out, print_json, print_rows
 
@@ -23,29 +24,25 @@ def robots(*, as_json: Json = False) -> None:
     _print(dict(ROBOTS), as_json)
 
 
-def worlds(*, as_json: Json = False) -> None:
-    """List the world generators with their parameters, and the files that can be loaded."""
-    from brrt.worlds import GENERATORS, LOADERS  # noqa: PLC0415
-
-    _print(dict(GENERATORS), as_json)
-    if not as_json:
-        endings = ", ".join(dict.fromkeys(e for kind in LOADERS.values() for e in kind.endings))
-        out.print(
-            f"Use one as --world circles2d:n=80,seed=3, or give a file ({endings}).",
-            markup=False,
-        )
-
-
-def _print(registry: dict[str, type], as_json: bool) -> None:
-    described = {
-        name: {"about": (kind.__doc__ or "").split("\n")[0], "params": kind.describe()}  # type: ignore[attr-defined]
+def described(registry: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return for each class of a registry what it is about and what can be set."""
+    return {
+        name: {"about": (kind.__doc__ or "").split("\n")[0], "params": kind.describe()}
         for name, kind in registry.items()
     }
-    if as_json:
-        print_json(described)
-        return
-    for name, entry in described.items():
-        out.print(f"[bold]{name}[/bold]  {entry['about']}")
+
+
+def print_described(entries: dict[str, dict[str, Any]]) -> None:
+    """Print them as tables."""
+    for name, entry in entries.items():
+        out.print(f"[bold]{name}[/bold]  {escape(entry['about'])}")
         if entry["params"]:
             print_rows([{**row, "name": f"  {row['name']}"} for row in entry["params"]])
         out.print()
+
+
+def _print(registry: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print_json(described(registry))
+    else:
+        print_described(described(registry))

@@ -7,7 +7,9 @@ from pathlib import Path
 from brrt.errors import BrrtError
 
 
-def check_output(path: Path | None, option: str, suffix: str, *, force: bool) -> None:
+def check_output(
+    path: Path | None, option: str, suffix: str | tuple[str, ...], *, force: bool
+) -> None:
     """See that a file can be written.
 
     Raises:
@@ -15,8 +17,9 @@ def check_output(path: Path | None, option: str, suffix: str, *, force: bool) ->
     """
     if path is None:
         return
-    if path.suffix != suffix:
-        raise BrrtError(f"{option} {path}: the name must end in {suffix}")
+    allowed = (suffix,) if isinstance(suffix, str) else suffix
+    if path.suffix not in allowed:
+        raise BrrtError(f"{option} {path}: the name must end in {' or '.join(allowed)}")
     if not path.parent.is_dir():
         raise BrrtError(f"{option} {path}: there is no folder {path.parent}; make it first")
     if path.is_dir():

@@ -177,6 +177,8 @@ def plan(
     _tell_of_compiling()
     with Watch(settings.iterations, "preparing the planner").running() as watch:
         run = Run(settings)
+        for line in run.problem.world.notes:
+            note(line)
         watch.total = None if settings.time is not None else run.stop.iterations
         with stop_on_signals(run.stop):
             metrics = run.execute(_sinks(run, mcap, rrd, view=view), lambda m: _show(m, watch))

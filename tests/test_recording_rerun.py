@@ -455,7 +455,7 @@ def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
-    monkeypatch.setattr(rerun, "_PORT", port)
+    monkeypatch.setattr("brrt.recording.viewer.PORT", port)
     monkeypatch.setattr(rr, "spawn", lambda **_: None)
     viewer = rr.RecordingStream("viewer", send_properties=False)
     viewer.serve_grpc(grpc_port=port)

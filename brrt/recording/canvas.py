@@ -7,6 +7,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from brrt.colours import Colour
 from brrt.events import Table
 from brrt.recording import scene
 from brrt.recording.columns import line_strips, time_columns
@@ -39,7 +40,7 @@ class Canvas:
         return scene.places(values, self.robot)
 
     def style(
-        self, entity: str, archetype: Any, colour: scene.Colour, radius: float, layer: float
+        self, entity: str, archetype: Any, colour: Colour, radius: float, layer: float
     ) -> None:
         """Log what all rows of an entity share; a negative radius is in points of the screen."""
         order = {"draw_order": layer} if self.dim == 2 else {}
@@ -61,12 +62,12 @@ class Canvas:
             given["draw_order"] = np.full(rows, layer, np.float32)
         return archetype.columns(**given)
 
-    def plot_style(self, entity: str, name: str, colour: scene.Colour) -> None:
+    def plot_style(self, entity: str, name: str, colour: Colour) -> None:
         """Name and colour a plot."""
         line = rr.SeriesLines(names=name.replace("_", " "), colors=colour, widths=1.5)
         self.still(entity, line)
 
-    def plot_dots(self, entity: str, name: str, colour: scene.Colour) -> None:
+    def plot_dots(self, entity: str, name: str, colour: Colour) -> None:
         """Show the values of a plot as dots too."""
         dots = rr.SeriesPoints(colors=colour, marker_sizes=3, names=name)
         self.still(entity, dots)

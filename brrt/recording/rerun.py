@@ -1,13 +1,9 @@
 """Events into Rerun and back: exact columns to replay from, and a picture beside them."""
 
 import hashlib
-import importlib.util
 import json
-import os
-import shutil
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +13,7 @@ from rerun.chunk import RrdReader
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, Table, table_dtype
+from brrt.recording import viewer
 from brrt.recording.columns import TIMELINES, from_arrow, time_columns, to_arrow
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
@@ -27,11 +24,9 @@ from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-APPLICATION = "brrt"
 _MAGIC = b"RRF2"
 _EVENTS, _OURS = "/ev/", "/brrt/"
 _MANIFEST, _WORLD, _END = "/brrt/manifest", "/brrt/world", "/brrt/end"
-_PORT = 9876
 _BATCH = 1 << 16
 
 
@@ -65,11 +60,11 @@ class RerunSink:
         self._metrics = Metrics(manifest)
         self._layout = blueprint(manifest, world)
         self._rec: Any = rr.RecordingStream(
-            APPLICATION, recording_id=recording_id(manifest), send_properties=False
+            viewer.APPLICATION, recording_id=recording_id(manifest), send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._rec)
         if view:
-            _open_viewer(self._rec)
+            viewer.open_viewer(self._rec)
         self._drain = None if self._path is None else Drain(self._path)
         try:
             self._connect(blueprint(manifest, world, live=True) if view else self._layout)
@@ -120,7 +115,7 @@ class RerunSink:
     def _connect(self, layout: Any) -> None:
         sinks: list[Any] = []
         if self._view:
-            sinks.append(rr.GrpcSink(f"rerun+http://127.0.0.1:{_PORT}/proxy"))
+            sinks.append(rr.GrpcSink(viewer.address()))
         if self._drain is None:
             self._rec.set_sinks(*sinks, default_blueprint=layout)
             return
@@ -176,42 +171,6 @@ def recording_id(manifest: Manifest) -> str:
     """Name a recording: equal for runs that are the same in everything, the clock included."""
     digest = hashlib.sha256(json.dumps(manifest.to_strings()).encode()).hexdigest()
     return f"{manifest.scenario.planner}-{digest[:16]}"
-
-
-def _open_viewer(rec: rr.RecordingStream) -> None:
-    own = importlib.util.find_spec("rerun_cli")
-    folder = None if own is None or own.origin is None else str(Path(own.origin).parent)
-    # Rerun looks for its viewer on the PATH alone, where a venv that is not activated is missing.
-    program = shutil.which("rerun", path=folder) or shutil.which("rerun")
-    try:
-        # Without a recording that is enabled, `spawn` does nothing.
-        with _nothing_to_inherit():
-            rr.spawn(
-                port=_PORT,
-                connect=False,
-                hide_welcome_screen=True,
-                executable_path=program,
-                recording=rec,
-            )
-    except RuntimeError as error:
-        reason = str(error).strip().splitlines()[0]
-        raise RecordingError(f"cannot open the Rerun viewer: {reason}") from None
-
-
-@contextmanager
-def _nothing_to_inherit() -> Iterator[None]:
-    """Keep our output from a child that outlives us: a pipe that we write to would never end."""
-    kept = {number: os.dup(number) for number in (1, 2)}
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for number in kept:
-            os.dup2(nowhere, number)
-        yield
-    finally:
-        for number, copy in kept.items():
-            os.dup2(copy, number)
-            os.close(copy)
-        os.close(nowhere)
 
 
 def _archetype(entity: str) -> str:

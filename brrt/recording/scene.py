@@ -1,7 +1,6 @@
 """What a recording looks like in Rerun: colours, the still parts of the picture, the layout."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,22 +8,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from brrt.colours import GOAL, START, Colour
 from brrt.events import Reason, Source, Stage
+from brrt.recording import landscape
 from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
-from brrt.worlds.occupancy import Grid
-from brrt.worlds.survey import covered
 from brrt.worlds.world import World
 
-Colour = tuple[int, int, int]
-
-FREE: Colour = (34, 37, 45)
-"""Free space: not black, so that dark obstacles stand out against it."""
-OBSTACLE: Colour = (10, 11, 14)
-OBSTACLE_3D = (112, 120, 137)
-OUTLINE: Colour = (96, 103, 118)
-START: Colour = (255, 145, 30)
-GOAL: Colour = (60, 215, 100)
 OTHER: Colour = (180, 120, 255)
 """For what has no colour of its own here."""
 SAMPLES: Mapping[Source, Colour] = {
@@ -70,12 +60,6 @@ FADING_ITERATIONS, FADING_EVENTS, FADING_SECONDS = 300, 1000, 0.001
 _BRIEFER = 5
 """Rewired edges stay for a part of that: there may be several in an iteration."""
 
-_LAYERS, _OVERLAP = 5, 1.5
-"""Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
-covers the missing corner of the next."""
-_PIXELS = 640
-"""Along the longer side of the image that fills polygons: as fine as a window shows a map."""
-
 
 def is_flat(manifest: Manifest) -> bool:
     """Whether the picture is drawn in 2D."""
@@ -114,148 +98,15 @@ def places(values: Any, robot: Robot) -> NDArray[np.float32]:
 
 def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
     """Draw obstacles, bounds, start and goal."""
-    if is_flat(manifest):
-        # Rerun's 2D views have y pointing down; maps have it pointing up.
-        rec.log("/world", rr.Transform3D(scale=[1, -1, 1]), static=True)
-    still = _still_2d(world) if is_flat(manifest) else _still_3d(world)
-    for entity, archetype in still.items():
-        rec.log(entity, archetype, static=True)
+    landscape.log_world(rec, world)
     robot = manifest.make_robot()
     marks = (("start", manifest.start, START), ("goal", manifest.goal, GOAL))
     for name, q, colour in marks:
-        place = places([q], robot)
         body = [np.concatenate([part, part[:1]]) for part in robot.outline(np.array(q))]
         if body:
             outline = rr.LineStrips2D(body, colors=colour, radii=-1.5, draw_order=90)
             rec.log(f"/world/{name}/body", outline, static=True)
-        rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
-        # Rerun writes a label across its point; this one stands below.
-        below = (
-            place - np.float32(0.012 * world.extent) * np.eye(manifest.dim, dtype=np.float32)[-1]
-        )
-        rec.log(f"/world/{name}/label", _label(below, colour, name), static=True)
-
-
-def _mark(place: NDArray[np.float32], colour: Colour, extent: float) -> Any:
-    if place.shape[1] == 2:
-        return rr.LineStrips2D(
-            _discs(place, 1e-6 * extent), colors=colour, radii=-7, draw_order=100
-        )
-    return rr.Points3D(place, colors=colour, radii=-7)
-
-
-def _label(place: NDArray[np.float32], colour: Colour, text: str) -> Any:
-    points: Any = rr.Points2D if place.shape[1] == 2 else rr.Points3D
-    return points(place, colors=colour, radii=0, labels=text, show_labels=True)
-
-
-def _still_2d(world: World) -> dict[str, Any]:
-    size = world.upper - world.lower
-    still: dict[str, Any] = {
-        "/world/bounds": rr.Boxes2D(
-            mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-1, draw_order=-1
-        ),
-        "/world/obstacles": rr.AnnotationContext(
-            [(0, "free", (0, 0, 0, 0)), (1, "blocked", OBSTACLE)]
-        ),
-    }
-    if len(world.balls):
-        radii = world.balls[:, 2]
-        discs = _discs(world.balls[:, :2], 1e-3 * radii[:, None])
-        still["/world/obstacles/balls"] = rr.LineStrips2D(
-            discs, radii=radii, colors=OBSTACLE, draw_order=0
-        )
-    if len(world.boxes):
-        still["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
-    outside = () if world.grid is None else tuple(world.grid.outside(world.lower, world.upper))
-    if world.polygons or outside:
-        still |= _filled_polygons(replace(world, polygons=world.polygons + outside, grid=None))
-    if world.grid is not None:
-        still |= _still_cells(world.grid)
-    return still
-
-
-def _still_cells(grid: Grid) -> Iterator[tuple[str, Any]]:
-    """Draw the cells as an image in a frame of its own."""
-    turn = rr.RotationAxisAngle([0, 0, 1], radians=grid.yaw)
-    frame = rr.Transform3D(translation=[*grid.origin, 0], rotation=turn, scale=grid.resolution)
-    yield "/world/obstacles/grid", frame
-    yield "/world/obstacles/grid/cells", _stencil(grid.cells)
-
-
-def _stencil(cells: NDArray[np.bool_]) -> rr.SegmentationImage:
-    """Draw pixels in the colour of obstacles, or not at all."""
-    return rr.SegmentationImage(cells.astype(np.uint8), opacity=1.0, draw_order=-1.5)
-
-
-def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:
-    """Lines that hardly go anywhere: their round ends make a disc, where points have shading."""
-    ends = centres + length
-    centres = centres.astype(np.float32)
-    ends = np.maximum(ends.astype(np.float32), np.nextafter(centres, np.float32(np.inf)))
-    return np.stack([centres, ends], axis=1)
-
-
-def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.Boxes2D:
-    """Boxes of thick lines nested in each other, and an edge: Rerun fills no shapes in 2D."""
-    centre, half = (lower + upper) / 2, (upper - lower) / 2
-    radius = half.min(axis=1) / (1 + _OVERLAP * (_LAYERS - 1))
-    inset = (1 + _OVERLAP * np.arange(_LAYERS)[:, None]) * radius
-    nested = np.maximum(half - inset[..., None], 0).reshape(-1, 2)
-    return rr.Boxes2D(
-        centers=np.tile(centre, (_LAYERS + 1, 1)),
-        half_sizes=np.concatenate([nested, half]),
-        radii=np.concatenate([np.tile(radius, _LAYERS), np.full(len(half), -0.5)]),
-        colors=OBSTACLE,
-        draw_order=0,
-    )
-
-
-def _filled_polygons(world: World) -> Iterator[tuple[str, Any]]:
-    """Polygons as lines around an image of what they cover: Rerun fills no shapes in 2D."""
-    pixel = world.extent / _PIXELS
-    columns, rows = np.maximum(1, np.ceil((world.upper - world.lower) / pixel)).astype(int)
-    y, x = np.mgrid[:rows, :columns]
-    points = world.lower + pixel * (np.stack([x, y], axis=-1).reshape(-1, 2) + 0.5)
-    hulls = replace(world, balls=np.empty((0, 3)), boxes=np.empty((0, 4)))
-    yield (
-        "/world/obstacles/inside",
-        rr.Transform3D(translation=[*world.lower, 0], scale=pixel),
-    )
-    yield "/world/obstacles/inside/pixels", _stencil(covered(hulls, points).reshape(rows, columns))
-    outlines = [np.concatenate([polygon, polygon[:1]]) for polygon in world.polygons]
-    radii = [-0.5 if len(polygon) > 2 else -1.5 for polygon in world.polygons]
-    yield (
-        "/world/obstacles/polygons",
-        rr.LineStrips2D(outlines, radii=radii, colors=OBSTACLE, draw_order=0),
-    )
-
-
-def _still_3d(world: World) -> dict[str, Any]:
-    see_through = rr.components.FillMode.TransparentFillMajorWireframe
-    size = world.upper - world.lower
-    still: dict[str, Any] = {
-        "/world/bounds": rr.Boxes3D(
-            mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-0.5, fill_mode="MajorWireframe"
-        )
-    }
-    if len(world.balls):
-        still["/world/obstacles/balls"] = rr.Ellipsoids3D(
-            centers=world.balls[:, :3],
-            radii=world.balls[:, 3],
-            colors=OBSTACLE_3D,
-            fill_mode=see_through,
-            line_radii=-0.5,
-        )
-    if len(world.boxes):
-        still["/world/obstacles/boxes"] = rr.Boxes3D(
-            mins=world.boxes[:, :3],
-            sizes=world.boxes[:, 3:] - world.boxes[:, :3],
-            colors=OBSTACLE_3D,
-            fill_mode=see_through,
-            radii=-0.5,
-        )
-    return still
+        landscape.log_mark(rec, world, name, places([q], robot), colour)
 
 
 def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> str:
@@ -334,7 +185,7 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
     run = rrb.TextDocumentView(origin="/run", name="Run")
     right = rrb.Vertical(*plots, log, run, row_shares=[3, 3, 3, 4, 5])
     return rrb.Blueprint(
-        rrb.Horizontal(_world_view(manifest, world), right, column_shares=[5, 2]),
+        rrb.Horizontal(_world_view(world), right, column_shares=[5, 2]),
         rrb.TimePanel(
             state="collapsed",
             # A robot that drives the path afterwards does so within the planner's last iteration.
@@ -347,7 +198,7 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
     )
 
 
-def _world_view(manifest: Manifest, world: World) -> Any:
+def _world_view(world: World) -> Any:
     past = [(name, rrb.TimeRangeBoundary.infinite()) for name in ("iteration", "event", "t")]
     recent = [
         ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS)),
@@ -364,27 +215,8 @@ def _world_view(manifest: Manifest, world: World) -> Any:
     shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
-    options: dict[str, Any] = {
-        "origin": "/",
-        "contents": "/world/**",
-        "name": "World",
-        "background": list(FREE),
-        "overrides": {entity: [_ranges(starts)] for entity, starts in shown.items()},
-    }
-    margin = 0.04 * (world.upper - world.lower)
-    low, high = world.lower - margin, world.upper + margin
-    if is_flat(manifest):
-        bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[-high[1], -low[1]])
-        return rrb.Spatial2DView(visual_bounds=bounds, **options)
-    centre = (world.lower + world.upper) / 2
-    reach = float(np.linalg.norm(world.upper - world.lower))
-    eye = rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=centre + reach * np.array([-0.6, -0.8, 0.5]),
-        look_target=centre,
-        eye_up=[0, 0, 1],
-    )
-    return rrb.Spatial3DView(eye_controls=eye, line_grid=False, **options)
+    overrides = {entity: [_ranges(starts)] for entity, starts in shown.items()}
+    return landscape.world_view(world, overrides)
 
 
 def _ranges(starts: list[tuple[str, Any]]) -> Any:

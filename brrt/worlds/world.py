@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
+from brrt.files import replacing
+from brrt.settings import pairs
 from brrt.worlds.convex import GREATEST, convex_polygon, gap
 from brrt.worlds.occupancy import Grid
 
@@ -262,9 +264,93 @@ class World:
             found["grid"] = Grid.from_json(found["grid"])
         return cls(str(data.get("name", "")), **found)
 
-    def save(self, path: Path) -> None:
-        """Write the world as JSON."""
-        path.write_text(self.to_json() + "\n")
+    @classmethod
+    def load(cls, path: Path | str, query: str = "", **parameters: Any) -> "World":
+        """Read a world from a file of any kind that brrt knows; see `brrt worlds list`.
+
+        Args:
+            path: The file, or what the command line takes, as `map.yaml:unknown=free`.
+            query: Which start and goal, of a file that has several, such as "12".
+            parameters: Settings of the loader.
+
+        Raises:
+            BrrtError: The file cannot be read, or is not a world.
+        """
+        from brrt.worlds import FileSpec, load_world  # noqa: PLC0415 - it imports this module
+
+        spec = FileSpec.parse(str(path))
+        given = pairs(f"world {path}", spec.params)
+        return load_world(spec.path, {**given, **parameters}, query or spec.query)
+
+    @classmethod
+    def generate(cls, generator: str, **parameters: Any) -> "World":
+        """Generate a world: `World.generate("boxes3d", n=80, seed=3)`; see `brrt worlds list`.
+
+        Its name is what the command line takes, so that a scenario can name it.
+
+        Raises:
+            BrrtError: There is no such generator or parameter, or a value is of no use.
+        """
+        from brrt.worlds import GENERATORS, make_world  # noqa: PLC0415 - it imports this module
+
+        if generator not in GENERATORS:
+            raise unknown("world", generator, GENERATORS)
+        given = (f"{name}={_text(value)}" for name, value in parameters.items())
+        return make_world(f"{generator}:{','.join(given)}".removesuffix(":"))
+
+    @classmethod
+    def circles(cls, **parameters: Any) -> "World":
+        """Generate circles in 2D: `World.circles(n=50, seed=3)`."""
+        return cls.generate("circles2d", **parameters)
+
+    @classmethod
+    def squares(cls, **parameters: Any) -> "World":
+        """Generate axis-aligned squares in 2D: `World.squares(n=50, seed=3)`."""
+        return cls.generate("squares2d", **parameters)
+
+    @classmethod
+    def spheres(cls, **parameters: Any) -> "World":
+        """Generate spheres in 3D: `World.spheres(n=50, seed=3)`."""
+        return cls.generate("spheres3d", **parameters)
+
+    def save(self, path: Path | str) -> None:
+        """Write the world as JSON; the file appears when it is whole.
+
+        Raises:
+            BrrtError: It cannot be written.
+        """
+        with replacing(Path(path)) as unfinished:
+            unfinished.write_text(self.to_json() + "\n")
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the world by matplotlib into axes, new ones by default; return the axes.
+
+        Raises:
+            BrrtError: matplotlib is missing, or the axes are not for this world.
+        """
+        from brrt.worlds.picture import plot  # noqa: PLC0415 - matplotlib is an extra
+
+        return plot(self, ax)
+
+    def __repr__(self) -> str:
+        counts = [f"{len(getattr(self, name))} {name}" for name in ("balls", "boxes", "polygons")]
+        cells = [] if self.grid is None else ["{} x {} cells".format(*self.grid.cells.shape)]
+        ends = [
+            f"{name} {_numbers(point)}"
+            for name, point in (("start", self.start), ("goal", self.goal))
+            if point is not None
+        ]
+        some = [count for count in counts if not count.startswith("0 ")]
+        bounds = f"{_numbers(self.lower)} to {_numbers(self.upper)}"
+        parts = [repr(self.name), bounds, *some, *cells, *ends]
+        return f"<World {'; '.join(parts)}>"
+
+
+def _text(value: Any) -> str:
+    """Write a value as the command line takes it."""
+    if value is None:
+        return "auto"
+    return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
 
 
 def _numbers(values: Floats) -> str:

@@ -12,23 +12,30 @@ POINTS = 1 << 15
 """Points at which the share is measured, about: one at random in each cell of a lattice."""
 _SEED = 0
 _PAIRS = 1 << 20
-_LAYERS = 100
-"""How often obstacles may cover the map on average before the share is given up."""
+_LAYERS, _MANY = 100, 2000
+"""How often obstacles may cover the map on average before the share is given up, and how many of
+them it takes at least."""
+
+_SPARE = 1.5
+"""By how much the share that many obstacles will cover may be off, as a factor of their volume."""
 
 
-def fewest(density: float, upper: Floats, obstacles: Iterable[Shapes]) -> tuple[int, float]:
+def fewest(
+    density: float, upper: Floats, obstacles: Iterable[Shapes], most: int
+) -> tuple[int, float]:
     """Count the obstacles of a sequence that are needed to cover a share of the map.
 
     Args:
         density: The share, 0 to 1.
         upper: Greatest corner of the map, shape (d,); the least is the origin.
         obstacles: The sequence, cut into parts of any length.
+        most: How many obstacles there are in it.
 
     Returns:
         The least number of obstacles that cover the share or more, and what they cover.
 
     Raises:
-        BrrtError: The whole sequence does not, or so much of it that the rest will not either.
+        BrrtError: The sequence does not, or so much of it does not that the rest will not either.
     """
     lattice = Lattice.over(np.zeros(len(upper)), upper, POINTS)
     index = np.argwhere(np.ones(lattice.shape, np.bool_))
@@ -38,11 +45,17 @@ def fewest(density: float, upper: Floats, obstacles: Iterable[Shapes]) -> tuple[
     wanted = int(np.ceil(density * len(points)))
     count, layers = 0, 0.0
     for shapes in obstacles:
-        if (first < never).sum() >= wanted or layers > _LAYERS:
+        if (first < never).sum() >= wanted or (layers > _LAYERS and count > _MANY):
             break
         _mark(first, count, shapes, lattice, points)
         count += len(shapes.low)
         layers += float(((shapes.high - shapes.low) / upper).prod(axis=1).sum())
+        # n obstacles of volume v leave free about exp(-n v) of the map.
+        if -np.expm1(-_SPARE * layers * most / count) < density:
+            raise BrrtError(
+                f"density {density:g} would take more than {most:,} obstacles of this size; ask "
+                f"for less, or for larger ones"
+            )
     covered = int((first < never).sum())
     if covered < wanted:
         raise BrrtError(

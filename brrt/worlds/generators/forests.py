@@ -46,7 +46,7 @@ def poisson_disc(
         angle = rng.uniform(0, 2 * np.pi, len(active))
         aside = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
         tried = accepted.points[active] + aside
-        good: NDArray[np.bool_] = ((tried >= 0) & (tried <= side)).all(axis=1)
+        good = np.asarray(((tried >= 0) & (tried <= side)).all(axis=1))
         good[good] = allowed(tried[good])
         before = accepted.count
         good[good] = accepted.add(tried[good])

@@ -1,4 +1,4 @@
-"""Worlds drawn from a seed: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
+"""Obstacles all over the map: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -77,7 +77,7 @@ class Scattered(Seeded):
                 scenery = self.place(*drawn[-1])._asdict()
                 yield from shapes_of(World("", np.zeros(self.dim), self.upper(), **scenery))
 
-        count, share = fewest(self.density, self.upper(), batches())
+        count, share = fewest(self.density, self.upper(), batches(), _MOST)
         centres, halves = (np.concatenate(parts)[:count] for parts in zip(*drawn, strict=True))
         note = f"density {self.density:g} asked for: {count} obstacles cover {share:.4f} of the map"
         return self.place(centres, halves)._replace(notes=(note,))

@@ -1,0 +1,294 @@
+"""`brrt worlds`: what there is, what a world looks like, and saving one."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from .console import Watch, note, out, print_json, print_pairs, print_rows
+from .lists import Json, described, print_described
+
+if TYPE_CHECKING:
+    from brrt.worlds import World
+
+app = typer.Typer(invoke_without_command=True)
+Named = Annotated[
+    str,
+    typer.Argument(
+        metavar="WORLD",
+        help="A generator with parameters, as circles2d:n=80,seed=3, or a file.",
+        show_default=False,
+    ),
+]
+Start = Annotated[
+    str | None, typer.Option(help="Start, instead of the world's own.", metavar="X,Y[,Z]")
+]
+Goal = Annotated[
+    str | None, typer.Option(help="Goal, instead of the world's own.", metavar="X,Y[,Z]")
+]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite files.")]
+PICTURES = (".png", ".svg", ".pdf")
+
+
+@app.callback()
+def worlds(context: typer.Context, *, as_json: Json = False) -> None:
+    """List the world generators, show a world, or save one.
+
+    brrt worlds list circles2d
+
+    brrt worlds show circles2d:n=80,seed=3
+
+    brrt worlds make circles2d:n=80,seed=3 --out w.json
+    """
+    if context.invoked_subcommand is None:
+        list_worlds(None, as_json=as_json)
+
+
+@app.command("list")
+def list_worlds(
+    name: Annotated[
+        str | None, typer.Argument(help="One generator alone.", show_default=False)
+    ] = None,
+    *,
+    as_json: Json = False,
+) -> None:
+    """List the world generators with their parameters, and the files that can be loaded."""
+    from brrt.errors import unknown  # noqa: PLC0415 - keep --help fast
+    from brrt.worlds import GENERATORS, LOADERS  # noqa: PLC0415
+
+    generators, files = described(dict(GENERATORS)), described(dict(LOADERS))
+    for key, loader in LOADERS.items():
+        files[key] |= {"endings": list(loader.endings), "query": loader.queries}
+    entries = {**generators, **files}
+    if name is not None:
+        if name not in entries:
+            raise unknown("world", name, entries)
+        entries = {name: entries[name]}
+    if as_json:
+        print_json(entries)
+        return
+    if name is None:
+        _print_overview(generators, files)
+    print_described({key: entry for key, entry in entries.items() if entry["params"] or name})
+    if name is None:
+        for line in (
+            "Look at one: brrt worlds show circles2d:n=80,seed=3, or map.yaml:unknown=free",
+            "Plan in one: brrt plan --world arena.map.scen#12",
+        ):
+            out.print(line, markup=False)
+
+
+def _print_overview(generators: dict[str, Any], files: dict[str, Any]) -> None:
+    print_rows(
+        [{"name": key, "about": entry["about"]} for key, entry in generators.items()], whole=1
+    )
+    out.print()
+    rows = [
+        {"file": key, "about": f["about"], "endings": " ".join(f["endings"])}
+        for key, f in files.items()
+    ]
+    print_rows(rows, whole=1)
+    out.print()
+
+
+@app.command()
+def show(
+    world: Named,
+    *,
+    start: Start = None,
+    goal: Goal = None,
+    picture: Annotated[
+        Path | None, typer.Option("--out", help="Draw it into a .png, .svg or .pdf file.")
+    ] = None,
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun file of it.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Open it in the Rerun viewer.")] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Draw a world, and say what it is made of, how much is free, and whether there is a way.
+
+    brrt worlds show circles2d:n=80,seed=3
+
+    brrt worlds show map.txt --start 0,0,1 --goal 12,12,5 --out map.png
+    """
+    from brrt.worlds.survey import connected, free_fraction  # noqa: PLC0415 - keep --help fast
+
+    from .outputs import check_display, check_output  # noqa: PLC0415
+
+    check_output(picture, "--out", PICTURES, force=force)
+    check_output(rrd, "--rrd", ".rrd", force=force)
+    check_display(view=view)
+    with Watch(None, "making the world").running() as watch:
+        made = _made(world, start, goal)
+        figures = _figures(made)
+        watch.update(0, "measuring the free share", "")
+        figures["free"], figures["free_error"] = free_fraction(made)
+        if made.start is not None and made.goal is not None:
+            watch.update(0, "looking for a way", "")
+            found = connected(made, made.start, made.goal)
+            figures |= {"connected": found.connected, "cell": found.cell, "way": found.reason}
+        watch.update(0, "drawing", "")
+        drawing = None if as_json else _sketch(made)
+        _write(made, picture, rrd, view=view)
+    if as_json:
+        print_json(figures)
+        return
+    out.print(drawing, soft_wrap=True)
+    print_pairs(_rows(figures))
+    if picture is not None:
+        out.print(f"\n{picture}: the picture", markup=False, soft_wrap=True)
+    if rrd is not None:
+        name = escape(str(rrd))
+        out.print(f"\n{name}: look at it with [bold]rerun {name}[/bold]", soft_wrap=True)
+
+
+@app.command()
+def make(
+    world: Named,
+    *,
+    file: Annotated[
+        Path, typer.Option("--out", help="The .json file to write.", show_default=False)
+    ],
+    start: Start = None,
+    goal: Goal = None,
+    force: Force = False,
+) -> None:
+    """Save a world as brrt's own JSON, for plan --world.
+
+    brrt worlds make circles2d:n=80,seed=3 --out w.json
+    """
+    from .outputs import check_output  # noqa: PLC0415 - keep --help fast
+
+    check_output(file, "--out", ".json", force=force)
+    with Watch(None, "making the world").running():
+        made = _made(world, start, goal)
+        made.save(file)
+    what = ", ".join(_counts(_figures(made))) or "no obstacles"
+    text = f"{file}: {made.dim}D, {what}; plan in it with --world {file}"
+    out.print(text, markup=False, soft_wrap=True)
+
+
+def _made(spec: str, start: str | None, goal: str | None) -> "World":
+    from dataclasses import replace  # noqa: PLC0415 - keep --help fast
+
+    from brrt.worlds import make_world  # noqa: PLC0415
+
+    ends = {"start": _point("--start", start), "goal": _point("--goal", goal)}
+    world = make_world(spec, **ends)
+    for line in world.notes:
+        note(line)
+    return replace(world, **{name: end for name, end in ends.items() if end is not None})
+
+
+def _point(option: str, text: str | None) -> Any:
+    import numpy as np  # noqa: PLC0415 - keep --help fast
+
+    from brrt.errors import BrrtError  # noqa: PLC0415
+
+    try:
+        return None if text is None else np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise BrrtError(f"{option} must be numbers like 1,2, not {text!r}") from None
+
+
+def _sketch(world: "World") -> Any:
+    from .sketch import sketch  # noqa: PLC0415 - keep --help fast
+
+    try:
+        "█░┌".encode(out.encoding)
+        blocks = True
+    except (UnicodeEncodeError, LookupError):
+        blocks = False
+    # Nobody scrolls a pipe or a file: there, the usual page will do.
+    rows = max(out.size.height - 2, 20) if out.is_terminal else 42
+    return sketch(world, max(out.size.width, 24), rows, blocks=blocks)
+
+
+def _write(world: "World", picture: Path | None, rrd: Path | None, *, view: bool) -> None:
+    if picture is not None:
+        from brrt.worlds.picture import save_picture  # noqa: PLC0415 - matplotlib is an extra
+
+        save_picture(world, picture)
+    if rrd is not None or view:
+        from brrt.recording.show import show_world  # noqa: PLC0415 - costs half a second
+
+        show_world(world, path=rrd, view=view)
+
+
+def _figures(world: "World") -> dict[str, Any]:
+    """What the world consists of, for people and for programs."""
+    segments = sum(len(polygon) == 2 for polygon in world.polygons)
+    grid = None
+    if world.grid is not None:
+        rows, columns = world.grid.cells.shape
+        grid = {
+            "rows": rows,
+            "columns": columns,
+            "resolution": world.grid.resolution,
+            "yaw": world.grid.yaw,
+            "blocked": int(world.grid.cells.sum()),
+        }
+    return {
+        "world": world.name,
+        "dim": world.dim,
+        "lower": world.lower.tolist(),
+        "upper": world.upper.tolist(),
+        "balls": len(world.balls),
+        "boxes": len(world.boxes),
+        "polygons": len(world.polygons) - segments,
+        "segments": segments,
+        "grid": grid,
+        "free": None,
+        "free_error": None,
+        "start": None if world.start is None else world.start.tolist(),
+        "goal": None if world.goal is None else world.goal.tolist(),
+        "connected": None,
+        "cell": None,
+        "way": None,
+        "notes": list(world.notes),
+    }
+
+
+def _counts(figures: dict[str, Any]) -> Iterator[str]:
+    """The obstacles by their shapes, as far as there are any."""
+    flat = figures["dim"] == 2
+    names = {
+        "balls": ("circle", "circles") if flat else ("sphere", "spheres"),
+        "boxes": ("rectangle", "rectangles") if flat else ("box", "boxes"),
+        "polygons": ("polygon", "polygons"),
+        "segments": ("line segment", "line segments"),
+    }
+    for key, (one, several) in names.items():
+        if figures[key]:
+            yield f"{figures[key]:,} {one if figures[key] == 1 else several}"
+    grid = figures["grid"]
+    if grid is not None:
+        turned = f", turned by {grid['yaw']:.4g} rad" if grid["yaw"] else ""
+        yield (
+            f"a grid of {grid['rows']:,} x {grid['columns']:,} cells of {grid['resolution']:g}"
+            f"{turned}, {grid['blocked']:,} of them blocked"
+        )
+
+
+def _rows(f: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
+    yield "world", f["world"], ""
+    sides = zip(f["lower"], f["upper"], strict=True)
+    yield "bounds", f"{f['dim']}D, " + " x ".join(f"[{a:g}, {b:g}]" for a, b in sides), ""
+    yield "obstacles", ", ".join(_counts(f)) or "none", ""
+    yield "free", _share(f["free"], f["free_error"]), ""
+    for name in ("start", "goal"):
+        yield name, "none" if f[name] is None else ", ".join(f"{v:g}" for v in f[name]), ""
+    if f["way"] is not None:
+        style = {True: "bold green", False: "bold red", None: "bold yellow"}[f["connected"]]
+        word = {True: "yes", False: "no", None: "unknown"}[f["connected"]]
+        yield "connected", f"{word}, {f['way']}", style
+
+
+def _share(share: float, error: float) -> str:
+    if error == 0:
+        return f"{100 * share:.6g} %"
+    # Two digits of the error, and as many of the share.
+    digits = max(0, 1 - int(f"{100 * error:e}".partition("e")[2]))
+    return f"{100 * share:.{digits}f} %, standard error {100 * error:.{digits}f} %"

@@ -1,0 +1,46 @@
+"""Draw one world of each generator: the gallery of the README.
+
+    python docs/worlds.py [OUT.png]
+
+It needs matplotlib: pip install -e '.[plot]'.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+
+from brrt import GENERATORS, make_world
+
+COLUMNS, SIDE_IN = 8, 1.7
+
+SHOWN = {"circles2d": "n=40", "squares2d": "n=60", "spheres3d": "n=30", "boxes3d": "n=30"}
+"""Parameters that show better what a generator is about than its defaults."""
+
+
+def main() -> None:
+    """Draw them all on one sheet."""
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".png")
+    rows = -(-len(GENERATORS) // COLUMNS)
+    sheet = plt.figure(figsize=(COLUMNS * SIDE_IN, rows * SIDE_IN * 1.1), layout="constrained")
+    for i, name in enumerate(GENERATORS):
+        world = make_world(f"{name}:{SHOWN.get(name, '')}")
+        projection = "3d" if world.dim == 3 else None
+        axes: Any = sheet.add_subplot(rows, COLUMNS, i + 1, projection=projection)
+        world.plot(axes)
+        axes.set_title(name, fontsize=8)
+        if world.dim == 2:
+            axes.set(xticks=[], yticks=[])
+        else:
+            axes.set_axis_off()
+            axes.set_box_aspect(world.upper - world.lower, zoom=1.25)
+    sheet.savefig(out, dpi=110)
+
+
+if __name__ == "__main__":
+    main()
