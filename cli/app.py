@@ -10,6 +10,7 @@ from .lists import planners, robots
 from .plan import plan
 from .replay import replay
 from .verify import verify
+from .view import view
 from .worlds import app as worlds
 
 app = typer.Typer(
@@ -28,7 +29,7 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
 
-[bold]rerun run.rrd[/bold] shows the tree as it grows
+[bold]brrt view run.mcap[/bold] shows the tree as it grows
 
 [bold]brrt planners[/bold] lists what there is to set
 
@@ -38,6 +39,7 @@ Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130
 app.command()(plan)
 app.command()(replay)
 app.command()(verify)
+app.command()(view)
 app.command()(planners)
 app.command()(robots)
 app.add_typer(worlds, name="worlds")

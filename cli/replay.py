@@ -1,12 +1,12 @@
 """`brrt replay`: a run's figures and trees, from its recording alone."""
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
+from .instants import At, AtEvent, AtIteration, beyond, instant
 from .saved import Saved
 
 if TYPE_CHECKING:
@@ -18,22 +18,9 @@ _VERB = "replay them"
 
 def replay(
     run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
-    at: Annotated[
-        str | None,
-        typer.Option(
-            help="As it stood at this time of the run, as 1.5s, 20ms or 300us.",
-            metavar="TIME",
-            rich_help_panel="Instant",
-        ),
-    ] = None,
-    at_event: Annotated[
-        int | None,
-        typer.Option(help="As it stood after this event.", rich_help_panel="Instant"),
-    ] = None,
-    at_iteration: Annotated[
-        int | None,
-        typer.Option(help="As it stood after this iteration.", rich_help_panel="Instant"),
-    ] = None,
+    at: At = None,
+    at_event: AtEvent = None,
+    at_iteration: AtIteration = None,
     check: Annotated[
         Path | None,
         typer.Option(
@@ -79,7 +66,7 @@ def replay(
     check_output(rrd, "--rrd", ".rrd", force=force)
     if text and as_json:
         raise BrrtError("give one of --text and --json")
-    limits = _limits(at, at_event, at_iteration)
+    limits = instant(at, at_event, at_iteration)
     recording = read(run)
     metrics = Metrics(recording.manifest)
     trees = _Trees()
@@ -87,7 +74,9 @@ def replay(
     sinks: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
     end = _feed(recording, sinks, limits, partial=partial)
     if end is not None:
-        _note_if_beyond(limits, *end)
+        late = beyond(limits, *end)
+        if late is not None:
+            note(f"{late}; this is how it stood then")
     if rrd is not None:
         from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
 
@@ -117,32 +106,6 @@ def replay(
         raise typer.Exit(Code.FAILED)
 
 
-def _limits(at: str | None, event: int | None, iteration: int | None) -> dict[str, int]:
-    """Return the instant asked for, as `Events.until` takes it."""
-    from brrt.errors import BrrtError  # noqa: PLC0415
-
-    given = {"t": at, "seq": event, "iteration": iteration}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if len(chosen) > 1:
-        raise BrrtError("give one of --at, --at-event and --at-iteration")
-    if at is not None:
-        return {"t": _nanoseconds(at)}
-    limits = {name: int(value) for name, value in chosen.items()}
-    if any(value < 0 for value in limits.values()):
-        raise BrrtError("--at-event and --at-iteration count from 0")
-    return limits
-
-
-def _nanoseconds(text: str) -> int:
-    from brrt.errors import BrrtError  # noqa: PLC0415
-
-    match = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*(s|ms|us|ns)?", text.strip())
-    if match is None:
-        raise BrrtError(f"--at must be a time like 1.5s, 20ms or 300us, not {text!r}")
-    unit = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}[match[2] or "s"]
-    return int(float(match[1]) * unit)
-
-
 def _feed(
     recording: "Recording", sinks: list[Any], limits: dict[str, int], *, partial: bool
 ) -> "tuple[int, Instant] | None":
@@ -162,19 +125,6 @@ def _feed(
             return None
         count, last = count + len(batch), batch.last if len(batch) else last
     return count, last
-
-
-def _note_if_beyond(limits: dict[str, int], count: int, last: "Instant") -> None:
-    """Say so where the instant asked for lies after the end of the recording."""
-    ends = {"seq": count - 1, "t": last.t, "iteration": last.iteration}
-    texts = {
-        "seq": f"with event {count - 1:,}",
-        "t": f"at {last.t / 1e9:.6f} s",
-        "iteration": f"with iteration {last.iteration:,}",
-    }
-    for name, limit in limits.items():
-        if limit > ends[name]:
-            note(f"the recording ends {texts[name]}; this is how it stood then")
 
 
 def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:
