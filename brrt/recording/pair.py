@@ -25,7 +25,7 @@ MARK: Colour = (255, 64, 216)
 """Where two runs part; like nothing else in the picture."""
 LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
 """Of the plots, for each run."""
-_SHADES = 0.3
+_SHADES = 0.12
 """How much lighter each further line of a run is in one plot."""
 _RING = 0.02
 """Radius of the ring around the place where they part, as a part of the world's extent."""
@@ -82,7 +82,7 @@ def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
                 other = difference.right if side is left else difference.left
                 _mark(branch, side, difference.seq, other)
         if difference is not None:
-            _tell(rec, left, difference)
+            _tell(rec, max(left, right, key=lambda side: len(side.events)), difference)
         rec.flush()
     finally:
         rec.disconnect()
@@ -162,12 +162,15 @@ def _place(side: Side, seq: int, other: Mapping[str, Any] | None) -> NDArray[np.
     """
     until = side.events.until(seq=seq)
     newest = {kind: table[-1] for kind, table in until.tables.items()}
+    if not newest:
+        return np.array(side.manifest.start)
     kind, row = max(newest.items(), key=lambda item: int(item[1]["seq"]))
     if kind is Kind.PATH:
         theirs = () if other is None else other.get("waypoints", ())
-        parted = (i for i, (p, q) in enumerate(zip(row["waypoints"], theirs)) if (p != q).any())
+        pairs = zip(row["waypoints"], theirs, strict=False)
+        parted = (i for i, (ours, their) in enumerate(pairs) if (ours != their).any())
         return np.asarray(row["waypoints"][next(parted, -1)])
-    if kind is Kind.REWIRE or kind is Kind.CONNECT:
+    if kind in (Kind.REWIRE, Kind.CONNECT):
         edges = until[Kind.EDGE]
         tree = row["tree"] if kind is Kind.REWIRE else 0
         return np.asarray(edges["q"][(edges["tree"] == tree) & (edges["node"] == row["node"])][0])
