@@ -15,11 +15,10 @@ import numpy as np
 import psutil
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
 from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, McapSink, Run, Scenario, forest, read
-from brrt.colours import FREE, GOAL, OBSTACLE, START
+from brrt.colours import GOAL, OBSTACLE, START
 from brrt.errors import RecordingError
 from brrt.recording import drive, pair, scene
 from brrt.recording.drive import Cursor
@@ -179,9 +178,7 @@ def sides(*paths: Path) -> list[pair.Side]:
     found = []
     for path in paths:
         recording = read(path)
-        found.append(
-            pair.Side(path.name, recording.manifest, recording.world, recording.events())
-        )
+        found.append(pair.Side(path.name, recording.manifest, recording.world, recording.events()))
     return found
 
 
@@ -254,11 +251,185 @@ def test_two_runs_show_where_they_part(brrt: Callable[..., Result], tmp_path: Pa
         sample = read(path).events()[Kind.SAMPLE][0]
         assert sample["seq"] == 2
         where = frame(half[:620], read(path).world)
-        ring = of_colour(half, pair.MARK) & ~near(of_colour(half, FREE), 0)
-        at = np.argwhere(ring)
+        at = np.argwhere(of_colour(half, pair.MARK))
         row, column = where.pixels(sample["q"][None])[0]
         reach = 0.02 * (where.right - where.left)
         far = np.hypot(at[:, 0] - row, at[:, 1] - column)
         on_ring = np.abs(far - reach) < 3
         assert on_ring.sum() > 2 * np.pi * reach  # all around; the rest is the label below it
         assert (at[~on_ring][:, 0] > row + reach).all()
+
+
+# --- the browser --------------------------------------------------------------------------------
+
+
+@contextmanager
+def served(folder: Path, *args: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run `brrt view ... --web` until the body ends; hand over the process and its address."""
+    command = [sys.executable, "-m", "brrt_cli", "view", *map(str, args), "--web"]
+    with subprocess.Popen(
+        command,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(folder)},
+    ) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert " at http://127.0.0.1:" in line
+            yield process, line.split(" at ")[1].strip()
+        finally:
+            process.send_signal(signal.SIGTERM)
+
+
+def ports_of(process: psutil.Process) -> dict[int, str]:
+    """Where a process listens: ports, and the address of each."""
+    found = process.net_connections()
+    return {c.laddr.port: c.laddr.ip for c in found if c.status == psutil.CONN_LISTEN}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_web_is_for_this_machine_and_ends_in_order(number: int, tmp_path: Path) -> None:
+    """It listens on 127.0.0.1 alone; a signal ends it with its child and its file."""
+    with served(tmp_path, GOLDEN) as (process, address):
+        (child,) = psutil.Process(process.pid).children(recursive=True)
+        ports = ports_of(child)
+        assert set(ports.values()) == {"127.0.0.1"}
+        url = urlparse(address)
+        source = urlparse(parse_qs(url.query)["url"][0])
+        assert ports.keys() == {url.port, source.port}
+        assert list(tmp_path.glob("brrt-*"))
+        process.send_signal(number)
+        assert process.wait(20) == 130
+    assert not child.is_running()
+    assert not list(tmp_path.glob("brrt-*"))
+    assert process.stderr is not None
+
+
+def test_web_ports(brrt: Callable[..., Result], tmp_path: Path) -> None:
+    """A port that is taken is an error if the user chose it; otherwise another one is taken."""
+    with served(tmp_path, GOLDEN) as (_, first):
+        taken = urlparse(first).port
+        result = brrt("view", GOLDEN, "--web", "--port", taken)
+        assert (result.code, result.out) == (2, "")
+        assert result.err.startswith(f"brrt: port {taken} is taken; choose another one")
+        free = drive.free_port()
+        with served(tmp_path, GOLDEN, "--port", free) as (_, second):
+            assert urlparse(second).port == free
+        with served(tmp_path, GOLDEN) as (_, third):
+            assert urlparse(third).port != taken
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+def test_browser_shows_the_run(tmp_path: Path) -> None:
+    """The page shows obstacles, start, goal and the tree where they are in the world."""
+    recording = read(GOLDEN)
+    # The web viewer opens a recording where it says: at its end, if it follows what comes.
+    run = tmp_path / "run.rrd"
+    sink = RerunSink(recording.manifest, recording.world, path=run)
+    for batch in recording.batches():
+        sink.write(batch)
+    sink._rec.send_blueprint(scene.blueprint(recording.manifest, recording.world, live=True))
+    sink.close(whole=True)
+    end, picture = time.monotonic() + 150, np.zeros((*SIZE[::-1], 3), np.int64)
+    with (
+        served(tmp_path, run) as (_, address),
+        browser(tmp_path / "browser", SIZE, 200) as page,
+    ):
+        page.visit(address)
+        while of_colour(picture, TREE).sum() < 2000 and time.monotonic() < end:
+            time.sleep(1)
+            png = page.picture()
+            picture = opened(png) if png else picture
+    (tmp_path / "web.png").write_bytes(png)
+    where = frame(picture, recording.world)
+    world = recording.world
+    inside = np.array([ball[:2] for ball in world.balls if ball[2] > 3])
+    rows, columns = where.pixels(inside).T
+    assert len(rows) > 10
+    dark = of_colour(picture, OBSTACLE, 6)[rows, columns]
+    assert dark.mean() > 0.5  # trees and paths cover some
+    for q, colour in ((recording.manifest.start, START), (recording.manifest.goal, GOAL)):
+        row, column = where.pixels(np.array([q]))[0]
+        assert (
+            of_colour(picture, colour, 30)[row - 4 : row + 5, column - 4 : column + 5].mean() > 0.7
+        )
+    edges = rasterised(recording.events(), where, picture.shape[:2]) & ~on_top(picture)
+    assert (edges & near(tree_pixels(picture), 2)).sum() > 0.95 * edges.sum()
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["none.mcap"], "none.mcap: No such file or directory"),
+        (["text.mcap"], "text.mcap: not a recording"),
+        (["cut.rrd", "--screenshot", "x.png"], "cut.rrd: cut or damaged"),
+        (["cut.mcap", "--screenshot", "x.png"], "show them with --partial"),
+        (["a", "b", "c"], "one run, or two side by side, not 3"),
+        (["run.mcap", "--screenshot", "no/x.png"], "there is no folder no"),
+        (["run.mcap", "--screenshot", "x.jpg"], "must end in .png"),
+        (["run.mcap", "--screenshot", "old.png"], "exists already"),
+        (["run.mcap", "--web", "--screenshot", "x.png"], "give one of --web and --screenshot"),
+        (["run.mcap", "--web", "--at", "1ms"], "the web viewer opens at the start"),
+        (["run.mcap", "--port", "9999"], "add --web"),
+        (["run.mcap", "--web", "--port", "70000"], "65535"),
+        (["run.mcap", "--size", "9x9"], "add --screenshot"),
+        (["run.mcap", "--screenshot", "x.png", "--size", "9x9"], "200 to 8192 pixels"),
+        (["run.mcap", "--screenshot", "x.png", "--size", "big"], "WIDTHxHEIGHT, as 1600x1000"),
+        (["run.mcap", "--screenshot", "x.png", "--at", "soon"], "--at must be a time"),
+        (["run.mcap", "--at", "1s", "--at-event", "3"], "give one of --at, --at-event"),
+        (["run.mcap", "--at-event", "-1"], "count from 0"),
+        (["run.mcap", "--screenshot", "x.png", "--at-event", "99999"], "ends with event 367"),
+        (["run.mcap", "--screenshot", "x.png", "--at", "1h"], "--at must be a time"),
+        (["run.mcap", "--screenshot", "x.png", "--at", "9s"], "ends at 0.000367 s"),
+        ([], "Missing argument"),
+    ],
+)
+def test_bad_input(
+    args: list[str],
+    message: str,
+    brrt: Callable[..., Result],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One line, exit code 2, and nothing is written."""
+    (tmp_path / "run.mcap").write_bytes(GOLDEN.read_bytes())
+    (tmp_path / "text.mcap").write_text("no recording")
+    (tmp_path / "old.png").write_bytes(b"old")
+    (tmp_path / "cut.mcap").write_bytes(GOLDEN.read_bytes()[:12_000])
+    (tmp_path / "cut.rrd").write_bytes(drawn(GOLDEN, tmp_path).read_bytes()[:9000])
+    before = set(tmp_path.iterdir())
+    monkeypatch.setenv("DISPLAY", ":nowhere")  # nothing gets as far as opening a window
+    result = brrt("view", *args)
+    assert (result.code, result.out) == (2, "")
+    assert message in result.err
+    assert result.err.count("\n") == 1
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_no_display(brrt: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a display, one line names the other ways."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    result = brrt("view", GOLDEN)
+    assert (result.code, result.out) == (2, "")
+    assert result.err.count("\n") == 1
+    assert "--web" in result.err
+    assert "--screenshot" in result.err
+
+
+@pytest.mark.usefixtures("viewer")
+def test_partial(brrt: Callable[..., Result], tmp_path: Path) -> None:
+    """What is whole of a file that was cut can be put beside another run."""
+    long = record(tmp_path / "long.mcap", planner="rrt-star", iterations=40_000).read_bytes()
+    cut = tmp_path / "cut.mcap"
+    for length in (12_000, len(long) // 2):  # within the first chunk; some are whole
+        cut.write_bytes(long[:length])
+        for other in ([], [GOLDEN]):
+            result = brrt("view", cut, *other, "--partial", "--screenshot", "x.png", "--force")
+            assert result.code == 0, result.err

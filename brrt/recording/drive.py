@@ -21,6 +21,8 @@ START_S, LOAD_S, STILL_S = 60.0, 600.0, 60.0
 """Seconds that the viewer gets to start, to load a recording, and to draw it."""
 _PAUSE_S = 0.25
 """Between two looks at what the viewer does."""
+_EMPTY_S = 2.0
+"""After which a recording that has no times yet has none: nothing happened in it."""
 _NO_DRIVER = ("graphics adapter", "render context", "shared libraries", "Vulkan")
 """What it says as it dies for want of a driver."""
 
@@ -226,15 +228,18 @@ def _load(client: ViewerClient, run: Path, cursor: Cursor | None) -> None:
         said = [entry.message for entry in client.get_logs() if entry.level == "ERROR"]
         reason = said[-1].splitlines()[0] if said else "it does not say why"
         raise RecordingError(f"{run}: the Rerun viewer does not take it: {reason}")
-    end = time.monotonic() + LOAD_S
-    while time.monotonic() < end:
+    begin = time.monotonic()
+    while time.monotonic() < begin + LOAD_S:
         state = client.get_state()
         mine = next((each for each in state.recordings if each.store_id == stores[0]), None)
-        if not state.loading and mine is not None and mine.timelines and state.views:
+        if mine is not None and state.views and not state.loading:
             if cursor is None or (mine.current_timeline, mine.current_time) == cursor:
                 return
-            time_asked = _time(cursor)
-            client.set_time(cursor.timeline, **time_asked, play_state="paused", recording=stores[0])
+            if mine.timelines:
+                at = _time(cursor)
+                client.set_time(cursor.timeline, **at, play_state="paused", recording=stores[0])
+            elif time.monotonic() > begin + _EMPTY_S:
+                return
         time.sleep(_PAUSE_S)
     raise RecordingError(f"{run}: the Rerun viewer does not show it within {LOAD_S:.0f} s")
 
