@@ -3,8 +3,10 @@
 import re
 import signal
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -81,7 +83,7 @@ def view(
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
-    with tempfile.TemporaryDirectory(prefix="brrt-") as folder, _ending():
+    with tempfile.TemporaryDirectory(prefix="brrt-") as folder, _ending_in_order():
         with Watch(None, "drawing").running() as watch:
             file, cursor = _prepare(runs, limits, Path(folder), watch, partial=partial)
         if web:
@@ -89,10 +91,12 @@ def view(
             return
         from brrt.recording import drive  # noqa: PLC0415 - costs half a second
 
-        if screenshot is None:
-            drive.show(file, cursor)
-        else:
-            drive.screenshot(file, screenshot, cursor, pixels)
+        with Watch(None, "waiting for the viewer").running():
+            if screenshot is None:
+                drive.show(file, cursor)
+            else:
+                drive.screenshot(file, screenshot, cursor, pixels)
+        if screenshot is not None:
             out.print(f"{screenshot}: written", markup=False, soft_wrap=True)
 
 
@@ -238,16 +242,15 @@ def _serve(file: Path, runs: list[Path], port: int | None) -> None:
         server.close()
 
 
-class _ending:  # noqa: N801 - reads as what it does in a `with`
-    """Ends by a signal as by Ctrl-C: nothing that we started or wrote for a while outlives us."""
-
-    def __enter__(self) -> None:
-        self._before: dict[int, Any] = {}
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            self._before[number] = signal.signal(number, _interrupt)
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
+@contextmanager
+def _ending_in_order() -> Iterator[None]:
+    """End by a signal as by Ctrl-C: nothing that we started or wrote for a while outlives us."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, _interrupt) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
             signal.signal(number, handler)
 
 

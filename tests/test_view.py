@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import Any
 from urllib.parse import parse_qs, urlparse
 
 import numpy as np
-import psutil
 import pytest
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
@@ -284,15 +284,16 @@ def served(folder: Path, *args: object) -> Iterator[tuple[subprocess.Popen[str],
             process.send_signal(signal.SIGTERM)
 
 
-def ports_of(process: psutil.Process) -> dict[int, str]:
+def ports_of(process: Any) -> dict[int, str]:
     """Where a process listens: ports, and the address of each."""
     found = process.net_connections()
-    return {c.laddr.port: c.laddr.ip for c in found if c.status == psutil.CONN_LISTEN}
+    return {each.laddr.port: each.laddr.ip for each in found if each.status == "LISTEN"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_web_is_for_this_machine_and_ends_in_order(number: int, tmp_path: Path) -> None:
     """It listens on 127.0.0.1 alone; a signal ends it with its child and its file."""
+    psutil = pytest.importorskip("psutil")
     with served(tmp_path, GOLDEN) as (process, address):
         (child,) = psutil.Process(process.pid).children(recursive=True)
         ports = ports_of(child)
@@ -305,7 +306,6 @@ def test_web_is_for_this_machine_and_ends_in_order(number: int, tmp_path: Path) 
         assert process.wait(20) == 130
     assert not child.is_running()
     assert not list(tmp_path.glob("brrt-*"))
-    assert process.stderr is not None
 
 
 def test_web_ports(brrt: Callable[..., Result], tmp_path: Path) -> None:
