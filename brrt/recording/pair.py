@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,9 @@ LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
 """Of the plots, for each run."""
 _SHADES = 0.12
 """How much lighter each further line of a run is in one plot."""
-_RING = 0.02
-"""Radius of the ring around the place where they part, as a part of the world's extent."""
+_RING = {2: 0.02, 3: 0.04}
+"""Radius of the ring around the place where they part, as a part of the world's extent; by the
+world's dimensions."""
 _CIRCLE = np.linspace(0, 2 * np.pi, 49)
 
 
@@ -140,20 +142,21 @@ def _draw(branch: Any, side: Side) -> None:
 
 
 def _mark(branch: Any, side: Side, seq: int, other: Mapping[str, Any] | None) -> None:
-    """Draw a ring around the place where the runs part, at all times: it is what one looks for."""
+    """Ring the place where the runs part, at all times: it is what one looks for."""
     robot = side.manifest.make_robot()
     place = scene.places([_place(side, seq, other)], robot)
-    radius = _RING * side.world.extent
-    if side.world.dim == 2:
-        ring = place + radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
-        shape: Any = rr.LineStrips2D([ring], colors=MARK, radii=-2, draw_order=110)
-    else:
-        shape = rr.Ellipsoids3D(
-            centers=place, radii=[radius], colors=MARK, fill_mode="MajorWireframe", line_radii=-1
-        )
+    ring = _RING[side.world.dim]
+    axes = np.eye(side.world.dim) * ring * side.world.extent
+    rings = [
+        place + np.outer(np.cos(_CIRCLE), a) + np.outer(np.sin(_CIRCLE), b)
+        for a, b in combinations(axes, 2)
+    ]
+    layer = {"draw_order": 110} if side.world.dim == 2 else {}
+    strips: Any = rr.LineStrips2D if side.world.dim == 2 else rr.LineStrips3D
+    shape = strips(rings, colors=MARK, radii=-2, **layer)
     branch.log("/world/difference", shape, static=True)
     text = f"first difference: event {seq}"
-    landscape.log_label(branch, side.world, "difference", place, MARK, text, _RING + 0.012)
+    landscape.log_label(branch, side.world, "difference", place, MARK, text, ring + 0.012)
 
 
 def _place(side: Side, seq: int, other: Mapping[str, Any] | None) -> NDArray[np.float64]:
