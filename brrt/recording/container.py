@@ -2,7 +2,6 @@
 
 import struct
 import zlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,23 +25,14 @@ class Container:
     Args:
         path: The file; it is overwritten.
         library: Who writes it.
-        schemas: All schemas.
-        channels: All channels.
         level: Of the compression by zstd.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        library: str,
-        schemas: Sequence[records.Schema],
-        channels: Sequence[records.Channel],
-        level: int = 1,
-    ) -> None:
+    def __init__(self, path: Path, library: str, level: int = 1) -> None:
         self._compressor = zstandard.ZstdCompressor(level=level)
         self._position, self._crc = 0, 0
-        self._index = _Summary(schemas, channels)
-        self._prefix = self._index.schemas_and_channels()
+        self._index = _Summary()
+        self._prefix = b""
         self._file = path.open("wb")
         self._write(MAGIC)
         self._record(records.Header("ros2", library))
@@ -51,6 +41,14 @@ class Container:
     def closed(self) -> bool:
         """Whether nothing can be written any more."""
         return self._file.closed
+
+    def declare(self, *declared: records.Schema | records.Channel) -> None:
+        """Declare schemas and channels before the first chunk that needs them."""
+        builder = RecordBuilder()
+        for record in declared:
+            record.write(builder)
+        self._prefix += builder.end()
+        self._index.declare(*declared)
 
     def chunk(
         self,
@@ -151,21 +149,18 @@ class Container:
 class _Summary:
     """What the end of the file says of the rest."""
 
-    def __init__(
-        self, schemas: Sequence[records.Schema], channels: Sequence[records.Channel]
-    ) -> None:
-        self.schemas, self.channels = list(schemas), list(channels)
+    def __init__(self) -> None:
+        self.schemas: list[records.Schema] = []
+        self.channels: list[records.Channel] = []
         self.chunks: list[records.ChunkIndex] = []
         self.attachments: list[records.AttachmentIndex] = []
         self.metadata: list[records.MetadataIndex] = []
         self._counts: dict[int, int] = {}
 
-    def schemas_and_channels(self) -> bytes:
-        """Return their records, for the first chunk."""
-        builder = RecordBuilder()
-        for record in (*self.schemas, *self.channels):
-            record.write(builder)
-        return bytes(builder.end())
+    def declare(self, *declared: records.Schema | records.Channel) -> None:
+        """Note schemas and channels."""
+        self.schemas += [record for record in declared if isinstance(record, records.Schema)]
+        self.channels += [record for record in declared if isinstance(record, records.Channel)]
 
     def add_chunk(self, chunk: records.ChunkIndex, counts: dict[int, int]) -> None:
         """Note a chunk and its messages by channel."""

@@ -54,9 +54,10 @@ class McapSink:
         self._dof, self._pending_since = manifest.dof, 0.0
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
         try:
-            self._file = Container(self._path, library, _schemas(manifest.dof), _channels())
+            self._file = Container(self._path, library)
         except OSError as error:
             raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
+        self._file.declare(*_schemas(manifest.dof), *_channels())
         with self._failing():
             self._file.metadata(RUN, manifest.to_strings())
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
