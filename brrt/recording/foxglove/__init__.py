@@ -32,9 +32,9 @@ from brrt.recording.recording import Recording
 EXPORT = "brrt.export"
 """Name of the metadata that say of which run it is."""
 
-_CHUNK, _LEVEL = 16 << 20, 9
+_CHUNK, _LEVEL = 16 << 20, 13
 """Bytes of a chunk and level of compression: most of what is told was told before, in the same
-chunk. Small chunks cost a third more, the first level another fifth."""
+chunk. At 4 MiB the file is a sixth larger, at level 3 a quarter."""
 
 
 def export(
@@ -43,7 +43,7 @@ def export(
     *,
     layout_path: Path | str | None = None,
     events: Events | None = None,
-    progress: Callable[[float], None] = lambda part: None,
+    progress: Callable[[float], object] = float,
 ) -> int:
     """Write a recording as messages that Foxglove and Lichtblick draw.
 
@@ -106,7 +106,7 @@ def _pack(
 
 
 def _fill(
-    file: Container, messages: Iterator[_Packed], end: int, progress: Callable[[float], None]
+    file: Container, messages: Iterator[_Packed], end: int, progress: Callable[[float], object]
 ) -> int:
     """Write messages in chunks; return how many they are."""
     count, size, pending = 0, 0, list[_Packed]()

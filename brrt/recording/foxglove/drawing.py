@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.colours import Colour
+from brrt.errors import RecordingError
 from brrt.events import Events, Kind, Stage, Table
 from brrt.recording import scene
 from brrt.recording.foxglove.lifetimes import BATCH, tell
@@ -79,6 +81,7 @@ class Drawing:
         t = t[np.argsort(seq, kind="stable")]
         edges = made.parent >= 0
         node, parent = made.node[edges], made.parent[edges]
+        _check_nodes(made.seq[edges], parent, len(places))
         ends = np.stack([places[parent], places[node]], axis=1)
         name, colour = scene.tree_style(number)
         return self._lines(f"/viz/tree/{name}", t[edges], node, ends, colour, 1.5)
@@ -103,6 +106,8 @@ class Drawing:
         if not len(table) or not {0, 1} <= self._trees.keys():
             return iter(())
         froms, tos = (self._places(self._trees[number].q) for number in (0, 1))
+        _check_nodes(table["seq"], table["node"], len(froms))
+        _check_nodes(table["seq"], table["other"], len(tos))
         ends = np.stack([froms[table["node"]], tos[table["other"]]], axis=1)
         keys = np.arange(len(table))
         return self._lines("/viz/link", table["t"], keys, ends, scene.LINK, 4.0)
@@ -175,16 +180,26 @@ class Drawing:
 
     def _of_tree(self, kind: Kind, number: int) -> Table:
         table = self._events[kind]
-        return table[table["tree"] == number]
+        mine: Table = table[table["tree"] == number]
+        return mine
 
     def _lines(
-        self, topic: str, t: Ints, keys: Ints, ends: Places, colour: scene.Colour, width: float
+        self, topic: str, t: Ints, keys: Ints, ends: Places, colour: Colour, width: float
     ) -> Stream:
+        points = np.zeros((len(ends), 2, 3))
+        points[..., : self._world.dim] = ends
+
         def draw(items: Ints) -> Marker:
-            points = ends[items].reshape(-1, self._world.dim)
-            return line_of(self._world, points, colour, width, LINES)
+            return line_of(self._world, points[items].reshape(-1, 3), colour, width, LINES)
 
         return _told(topic, t, keys, draw)
+
+
+def _check_nodes(seq: Ints, nodes: NDArray[np.integer], count: int) -> None:
+    wrong = np.flatnonzero((nodes < 0) | (nodes >= count))
+    if len(wrong):
+        i = wrong[0]
+        raise RecordingError(f"event {seq[i]}: there is no node {nodes[i]}; see brrt verify")
 
 
 def _told(topic: str, t: Ints, keys: Ints, draw: Callable[[Ints], Marker]) -> Stream:

@@ -8,7 +8,8 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,20 +135,18 @@ class Marker:
 
     def message(self) -> bytes:
         """Return the marker as a message of its own; one without points takes it away."""
-        body = _Body()
-        self._put(body, 0)
+        body = _Body(_head(self._style()))
+        self._put_rest(body)
         return bytes(body.data)
 
-    def _put(self, body: "_Body", number: int) -> None:
+    def _style(self) -> "_Style":
+        gone = self.points is not None and not len(self.points)
+        place = _space(self.place, self.z)
+        return _Style(self.shape, gone, place, self.scale, self.colour, self.alpha)
+
+    def _put_rest(self, body: "_Body") -> None:
+        """Append what differs among the many states of one drawing."""
         points = np.empty((0, 3)) if self.points is None else self.points
-        gone = self.points is not None and not len(points)
-        body.header()
-        body.text("")
-        body.put("iii", number, self.shape, 2 if gone else 0)
-        body.put("7d", *_space(self.place, self.z), 0, 0, 0, 1)
-        body.put("3d", *self.scale)
-        body.put("4f", *(part / 255 for part in self.colour), self.alpha)
-        body.put("iI?", 0, 0, False)
         body.rows(_heights(points, self.z), "<f8")
         body.rows(np.empty((0, 4)) if self.colours is None else self.colours, "<f4")
         body.text(self.text)
@@ -160,7 +159,8 @@ def array(markers: Sequence[Marker]) -> bytes:
     body = _Body()
     body.put("I", len(markers))
     for number, marker in enumerate(markers):
-        marker._put(body, number)  # noqa: SLF001 - its other form
+        _put_style(body, marker._style(), number)  # noqa: SLF001 - its other form
+        marker._put_rest(body)  # noqa: SLF001
     return bytes(body.data)
 
 
@@ -178,11 +178,22 @@ def occupancy(grid: Grid, z: float) -> bytes:
     return bytes(body.data)
 
 
+class _Style(NamedTuple):
+    """What stays the same while a drawing grows."""
+
+    shape: Shape
+    gone: bool
+    place: tuple[float, float, float]
+    scale: tuple[float, float, float]
+    colour: Colour
+    alpha: float
+
+
 class _Body:
     """A message as it grows: each number is aligned to its own size from after the header on."""
 
-    def __init__(self) -> None:
-        self.data = bytearray(b"\x00\x01\x00\x00")
+    def __init__(self, data: bytes = b"\x00\x01\x00\x00") -> None:
+        self.data = bytearray(data)
 
     def put(self, codes: str, *values: Any) -> None:
         """Append numbers of one size, and after them perhaps smaller ones, as struct names them."""
@@ -211,6 +222,24 @@ class _Body:
         self.data += bytes(-(len(self.data) - 4) % size)
 
 
+@lru_cache(64)
+def _head(style: _Style) -> bytes:
+    """Return the beginning of a marker's message, up to its points."""
+    body = _Body()
+    _put_style(body, style, 0)
+    return bytes(body.data)
+
+
+def _put_style(body: _Body, style: _Style, number: int) -> None:
+    body.header()
+    body.text("")
+    body.put("iii", number, style.shape, 2 if style.gone else 0)
+    body.put("7d", *style.place, 0, 0, 0, 1)
+    body.put("3d", *style.scale)
+    body.put("4f", *(part / 255 for part in style.colour), style.alpha)
+    body.put("iI?", 0, 0, False)
+
+
 def _space(place: NDArray[Any] | None, z: float) -> tuple[float, float, float]:
     """Return a place in 3D."""
     x, y, *rest = (0.0, 0.0, 0.0) if place is None else place.tolist()
@@ -218,5 +247,5 @@ def _space(place: NDArray[Any] | None, z: float) -> tuple[float, float, float]:
 
 
 def _heights(points: NDArray[Any], z: float) -> NDArray[Any]:
-    """Return points in 3D."""
+    """Return points, shape (..., d), in 3D."""
     return np.insert(points, 2, z, axis=1) if points.shape[1] == 2 else points
