@@ -17,7 +17,7 @@ from brrt.worlds.picture import need_matplotlib, save_figure
 
 PANELS = ("tree", "cost", "time")
 _CURVE_HEIGHT, _SCALE_HEIGHT = 2.4, 0.65
-_LEGEND_COLUMNS = 4
+_LEGEND_COLUMNS, _LEGEND_LINE = 4, 0.8
 _LOWEST, _HIGHEST = 0.3, 2.2
 """Shapes that a map may have, height by width, before it is drawn with empty margins."""
 
@@ -89,8 +89,7 @@ def tree_panel(part: Any, record: Record, look: Look) -> TreePanel:
     ax = part.add_subplot(projection=None if flat else "3d")
     if not flat:
         ax.view_init(elev=look.elevation, azim=look.azimuth)
-    panel = TreePanel(record, ax, look.rejects)
-    return panel
+    return TreePanel(record, ax, look.rejects)
 
 
 def height_of_tree(record: Record, width: float) -> float:
@@ -111,7 +110,11 @@ def _add_tree(part: Any, record: Record, look: Look) -> None:
     marks = panel.legend()
     rows = -(-len(marks) // _LEGEND_COLUMNS)
     columns = -(-len(marks) // rows)
-    part.legend(handles=marks, loc="outside lower center", ncols=columns, borderaxespad=0.2)
+    legend = part.legend(
+        handles=marks, loc="outside lower center", ncols=columns, borderaxespad=0.2
+    )
+    for line in legend.get_lines():
+        line.set(linewidth=max(line.get_linewidth(), _LEGEND_LINE), alpha=1.0)
     if panel.heat is not None:
         cells, meaning = panel.heat
         below = {"location": "bottom", "shrink": 0.8, "pad": 0.03, "aspect": 40}

@@ -70,6 +70,8 @@ class TreePanel:
         }
         self._here = self._line(0, style.ROBOT, "robot", marker="o", ms=4, mec="white", mew=0.6)
         self._here.set_zorder(_LAYERS["robot"])
+        for artist in self.moving:
+            artist.set_in_layout(False)  # it lies within the axes; to measure it takes seconds
         self.caption = ax.set_title("", loc="left", color=style.QUIET, pad=4)
         self.moving.append(self.caption)
 
@@ -97,6 +99,11 @@ class TreePanel:
         on_way = trace and not np.array_equal(trace[-1][-1], self._end(self._record.manifest.goal))
         self._place(self._here, trace[-1][-1:] if on_way else np.empty((0, 2)))
         self.caption.set_text(self._text(seq, best[1] if best else None))
+
+    @property
+    def drawn_last(self) -> list[Any]:
+        """Everything that moves, and what stands in front of it, from back to front."""
+        return sorted([*self.moving, *self._marks], key=lambda artist: artist.get_zorder())
 
     def legend(self) -> list[Any]:
         """Return what is in sight and has a name, for a legend."""
