@@ -134,7 +134,7 @@ def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
             f"{_MOST_PIXELS}; give a smaller --width or --dpi"
         )
     figure = Figure(figsize=size, dpi=look.dpi, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     panel = tree_panel(figure, record, look)
     panel.caption.set_text("room for the caption")
     canvas.draw()

@@ -16,7 +16,7 @@ Against = Literal["time", "iterations"]
 
 FEWEST = 5
 """Runs that differ in their seeds alone, from which on their median and quartiles are drawn."""
-_BINS = 60
+_BINS, _WILD = 60, 20
 
 
 class Curve(NamedTuple):
@@ -82,6 +82,8 @@ def draw_cost(ax: Any, records: Sequence[Record], against: Against | None = None
         for i, curve in zip(which, mine, strict=True):
             _draw_curve(ax, records[i], curve, next(colours), alone=len(records) == 1)
     ax.set_xlabel("iteration" if against == "iterations" else f"planning time ({unit})")
+    if against == "iterations":
+        ax.xaxis.set_major_formatter("{x:,.0f}")
     ax.set_ylabel("cost of the best path")
     style.clean(ax)
     ax.set_xlim(left=0)
@@ -103,7 +105,7 @@ def draw_time(axes: Sequence[Any], record: Record) -> None:
     last = _last_iteration(events)
     if last < 1:
         raise BrrtError(f"{record.name}: there are no iterations, so there is no time to draw")
-    edges = np.unique(np.linspace(0, last, min(last, _BINS) + 1).astype(np.int64))
+    edges = np.linspace(0, last, min(last, _BINS) + 1).astype(np.int64)
     elapsed = np.diff(_times_at(events, edges)) / 1e9
     rejects, added, everything = (_counted(events, edges, kinds) for kinds in _COUNTED)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -120,11 +122,15 @@ def draw_time(axes: Sequence[Any], record: Record) -> None:
         ax.stairs(values, edges, baseline=None, color=colour, linewidth=0.9)
         ax.set_ylabel(label)
         style.clean(ax)
-        ax.set_ylim(bottom=0)
+        if ax is axes[0] and _wild(values):
+            ax.set_yscale("log")
+        else:
+            ax.set_ylim(bottom=0)
         ax.set_xlim(0, last)
         ax.tick_params(labelbottom=ax is axes[-1])
     axes[1].set_ylim(0, 100)
     axes[-1].set_xlabel("iteration")
+    axes[-1].xaxis.set_major_formatter("{x:,.0f}")
 
 
 def _scaled(seconds: Floats) -> tuple[Floats, str]:
@@ -132,6 +138,12 @@ def _scaled(seconds: Floats) -> tuple[Floats, str]:
     taken = seconds[seconds > 0]
     size, unit = style.unit_of(float(np.median(taken)) if len(taken) else 1.0)
     return seconds / size, unit
+
+
+def _wild(values: Floats) -> bool:
+    """Whether a few values would leave nothing to see of the others on a scale from 0."""
+    taken = values[values > 0]
+    return len(taken) > 0 and bool(taken.max() > _WILD * np.median(taken))
 
 
 def _in_thousands(values: Floats) -> tuple[Floats, str]:
@@ -180,11 +192,13 @@ def _groups(records: Sequence[Record]) -> Iterator[tuple[str, list[int]]]:
     """Yield the runs that differ in their seeds alone, and a name for each lot."""
     found: dict[str, list[int]] = {}
     for i, record in enumerate(records):
-        scenario = record.manifest.scenario.as_dict()
-        found.setdefault(repr({**scenario, "seed": None, "draws": None}), []).append(i)
+        values = record.manifest.scenario.as_dict()
+        found.setdefault(repr({**values, "seed": None, "draws": None}), []).append(i)
     for which in found.values():
         scenario = records[which[0]].manifest.scenario
-        params = ", ".join(f"{name}={value}" for name, value in scenario.params.items())
+        params = ", ".join(
+            f"{name}={str(value).lower()}" for name, value in scenario.params.items()
+        )
         yield f"{scenario.planner}{' ' if params else ''}{params}", which
 
 

@@ -1,19 +1,20 @@
 """Figures of runs: panels side by side, in the width of a column or of a page."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from brrt.errors import BrrtError
+from brrt.errors import BrrtError, unknown
 from brrt.events import Kind
 from brrt.pictures import style
 from brrt.pictures.curves import Against, draw_cost, draw_time
 from brrt.pictures.history import Record
 from brrt.pictures.tree import MOST_VECTORS, TreePanel
-from brrt.worlds.picture import need_matplotlib, save_figure
+from brrt.worlds.picture import need_matplotlib, new_axes, save_figure
 
 PANELS = ("tree", "cost", "time")
 _CURVE_HEIGHT, _SCALE_HEIGHT = 2.4, 0.65
@@ -83,6 +84,31 @@ def save_plot(
         save_figure(figure, path, dpi=look.dpi)
 
 
+def plot(record: Record, ax: Any = None, *, what: str = "tree", rejects: int = 0) -> Any:
+    """Draw a run into axes, new ones by default; return the axes.
+
+    Args:
+        record: The run, up to the instant that is to be seen.
+        ax: Axes of matplotlib, with projection "3d" for the tree in a world in 3D.
+        what: "tree" or "cost".
+        rejects: How many of the newest rejected extensions are drawn.
+
+    Raises:
+        BrrtError: matplotlib is missing, the axes are of no use for this, or there is no path.
+    """
+    need_matplotlib()
+    if what not in PANELS[:2]:
+        raise unknown("panel", what, PANELS[:2])
+    with style.paper() if ax is None else nullcontext():
+        deep = what == "tree" and record.manifest.dim == 3
+        ax = new_axes("3d" if deep else None) if ax is None else ax
+        if what == "cost":
+            return draw_cost(ax, [record])
+        panel = TreePanel(record, ax, rejects)
+        panel.show(panel.history.last)
+    return ax
+
+
 def tree_panel(part: Any, record: Record, look: Look) -> TreePanel:
     """Put axes into a figure, or a part of one, and the run at no instant yet into these."""
     flat = record.manifest.dim == 2
@@ -114,7 +140,8 @@ def _add_tree(part: Any, record: Record, look: Look) -> None:
         handles=marks, loc="outside lower center", ncols=columns, borderaxespad=0.2
     )
     for line in legend.get_lines():
-        line.set(linewidth=max(line.get_linewidth(), _LEGEND_LINE), alpha=1.0)
+        if line.get_linewidth() > 0:
+            line.set(linewidth=max(line.get_linewidth(), _LEGEND_LINE), alpha=1.0)
     if panel.heat is not None:
         cells, meaning = panel.heat
         below = {"location": "bottom", "shrink": 0.8, "pad": 0.03, "aspect": 40}

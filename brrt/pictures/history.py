@@ -219,4 +219,3 @@ def _check_parents(made: Changes, nodes: int) -> None:
             f"event {made.seq[i]}: node {made.node[i]} gets parent {made.parent[i]}, "
             "which is not there; see brrt verify"
         )
-

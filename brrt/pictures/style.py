@@ -96,4 +96,3 @@ def unit_of(seconds: float) -> tuple[float, str]:
 def line_width(edges: int) -> float:
     """Return the width of a tree's edges, in points: thinner where there are many."""
     return float(np.clip(0.65 * (600 / max(edges, 1)) ** 0.3, 0.15, 0.65))
-

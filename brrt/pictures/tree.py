@@ -1,5 +1,7 @@
 """The world and what a run has made of it at an instant: trees or cells, paths, bodies."""
 
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,6 @@ _GHOSTS = 10
 """Places along a path at which the body is shown."""
 _PARTS = 16
 """Pieces of a motion, where the place that is drawn need not move straight."""
-_ALL = np.s_[:, :]
 _LAYERS = {"cells": 2.0, "rejects": 2.1, "tree": 2.2, "ghosts": 2.5, "trace": 2.7, "path": 3.0,
            "end": 5.0, "robot": 6.0}  # fmt: skip
 
@@ -49,7 +50,9 @@ class TreePanel:
         self.moving: list[Any] = []
         self._lines: dict[Any, Any] = {}
         if rejects:
-            self._lines["rejects"] = self._collection(style.REJECTED, 0.3, "rejects", 0.55, "rejected")
+            self._lines["rejects"] = self._collection(
+                style.REJECTED, 0.3, "rejects", 0.55, "rejected"
+            )
         if self.history.has_cells:
             self._cells = self._cell_marks()
         edges = self.history.nodes(self.history.last)
@@ -58,7 +61,9 @@ class TreePanel:
             width = style.line_width(edges)
             label = f"{name} tree"
             self._lines[number] = self._collection(colour, width, "tree", 1.0, label)
-            self._lines[number, "rewired"] = self._collection(rewired, width, "tree", 1.0, "rewired")
+            self._lines[number, "rewired"] = self._collection(
+                rewired, width, "tree", 1.0, "rewired"
+            )
         self._trace = self._collection(style.ROBOT, 0.5, "trace", 0.5, "moves")
         self._ghosts = self._bodies([], style.SMOOTHED, "ghosts") if self._flat else None
         self._paths = {
@@ -115,8 +120,6 @@ class TreePanel:
         ]
 
     def _draw_world(self) -> None:
-        from dataclasses import replace  # noqa: PLC0415
-
         ax, manifest = self._ax, self._record.manifest
         world = replace(self._record.world, start=None, goal=None)
         picture.plot(world, ax)
@@ -183,9 +186,7 @@ class TreePanel:
         if self._flat:
             from matplotlib.collections import PolyCollection  # noqa: PLC0415
 
-            marks = self._ax.add_collection(
-                PolyCollection([], linewidths=0, **look), autolim=False
-            )
+            marks = self._ax.add_collection(PolyCollection([], linewidths=0, **look), autolim=False)
         else:
             size = 90 * self._edge / self._record.world.extent
             marks = self._ax.scatter(
@@ -221,12 +222,13 @@ class TreePanel:
         """Return where a path goes; a body's place need not move straight between waypoints."""
         if len(path) > 1 and self._robot.outline(path[0]):
             parts = np.arange(_PARTS) / _PARTS
-            legs = [self._robot.interpolate(*pair, parts) for pair in zip(path, path[1:], strict=False)]
+            legs = [self._robot.interpolate(*pair, parts) for pair in pairwise(path)]
             path = np.concatenate([*legs, path[-1:]])
         return self._robot.places(path)
 
     def _end(self, q: Any) -> Floats:
-        return self._robot.places(np.array([q], np.float64))[0]
+        place: Floats = self._robot.places(np.array([q], np.float64))[0]
+        return place
 
     def _place(self, line: Any, places: Floats) -> None:
         if self._flat:

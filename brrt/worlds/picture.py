@@ -155,7 +155,7 @@ def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
     from matplotlib.patches import Rectangle  # noqa: PLC0415
     from matplotlib.transforms import Affine2D  # noqa: PLC0415
 
-    if not grid.reaches_allrgb(world.lower, world.upper):
+    if not grid.reaches_all_of(world.lower, world.upper):
         (x, y), size = world.lower, world.upper - world.lower
         ax.add_patch(Rectangle((x, y), *size, color=rgb(OBSTACLE), linewidth=0, zorder=-2))
     turned = Affine2D().rotate(grid.yaw).translate(*grid.origin)
