@@ -48,6 +48,27 @@ class Recording:
             metrics.write(batch)
         return metrics
 
+    def plot(
+        self, ax: Any = None, *, what: str = "tree", rejects: int = 0, **until: int | None
+    ) -> Any:
+        """Draw the run by matplotlib into axes, new ones by default; return the axes.
+
+        Args:
+            ax: Axes, with projection "3d" for the tree in a world in 3D.
+            what: "tree", or "cost" for that of the best path.
+            rejects: How many of the newest rejected extensions are drawn.
+            until: The instant, as `Events.until` takes it; the end by default.
+
+        Raises:
+            BrrtError: matplotlib is missing, the axes are of no use, or there is no path.
+        """
+        from brrt.pictures.figure import plot  # noqa: PLC0415 - matplotlib is an extra
+        from brrt.pictures.history import Record  # noqa: PLC0415
+
+        events = self.events().until(**until)
+        record = Record(self.manifest.scenario.planner, self.manifest, self.world, events)
+        return plot(record, ax, what=what, rejects=rejects)
+
     def check(self) -> list[Finding]:
         """Hold the run to what its planner promises; return what it breaks."""
         return check(self.manifest, self.world, self.events())
