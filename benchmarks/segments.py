@@ -72,11 +72,11 @@ def rows() -> list[Row]:
         Row("50 circles", "circles2d:n=50"),
         Row("50 squares", "squares2d:n=50"),
         Row("50 polygons", "polygons2d:n=50"),
-        Row("512 x 512 cells at random", "noise, 1 % blocked", draw=lambda: noise(512, 0.01)),
-        Row("1024 x 1024 cells at random", "noise, 1 % blocked", draw=lambda: noise(1024, 0.01)),
-        Row("1024 x 1024 cells at random", "noise, 0.01 % blocked", draw=lambda: noise(1024, 1e-4)),
-        Row("512 x 512 cells of rooms", "rooms of 32 cells", draw=lambda: rooms(512)),
-        Row("1024 x 1024 cells of rooms", "rooms of 32 cells", draw=lambda: rooms(1024)),
+        Row("512 x 512 cells, 1 % at random", "noise", draw=lambda: noise(512, 0.01)),
+        Row("1024 x 1024 cells, 1 % at random", "noise", draw=lambda: noise(1024, 0.01)),
+        Row("1024 x 1024 cells, 0.01 % at random", "noise", draw=lambda: noise(1024, 1e-4)),
+        Row("512 x 512 cells, rooms of 32 x 32", "rooms", draw=lambda: rooms(512)),
+        Row("1024 x 1024 cells, rooms of 32 x 32", "rooms", draw=lambda: rooms(1024)),
     ]
 
 

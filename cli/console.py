@@ -9,6 +9,7 @@ from enum import IntEnum
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
@@ -41,6 +42,12 @@ def print_json(data: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
 
 
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines on stdout as they are, however wide the terminal is."""
+    for line in lines:
+        out.print(line, markup=False, soft_wrap=True)
+
+
 def print_rows(
     rows: Sequence[Mapping[str, str]], title: str | None = None, *, whole: int = 2
 ) -> None:
@@ -49,7 +56,7 @@ def print_rows(
     for i, name in enumerate(rows[0]):
         table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < whole)
     for row in rows:
-        table.add_row(*(row[name] for name in row))
+        table.add_row(*(escape(row[name]) for name in row))
     out.print(table)
 
 

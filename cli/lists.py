@@ -3,6 +3,7 @@
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from .console import out, print_json, print_rows
 
@@ -34,7 +35,7 @@ def described(registry: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def print_described(entries: dict[str, dict[str, Any]]) -> None:
     """Print them as tables."""
     for name, entry in entries.items():
-        out.print(f"[bold]{name}[/bold]  {entry['about']}")
+        out.print(f"[bold]{name}[/bold]  {escape(entry['about'])}")
         if entry["params"]:
             print_rows([{**row, "name": f"  {row['name']}"} for row in entry["params"]])
         out.print()

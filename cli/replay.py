@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, out, print_json, print_rows, print_summary
+from .console import Code, out, print_json, print_lines, print_rows, print_summary
 from .instant import feed, limits_of, note_if_beyond
 from .saved import Saved
 
@@ -47,6 +47,12 @@ def replay(
     partial: Annotated[
         bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
     ] = False,
+    text: Annotated[
+        bool,
+        typer.Option(
+            "--text", help="Tell the run in plain text without times: the same on every machine."
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object, as plan --json did.")
     ] = False,
@@ -57,21 +63,28 @@ def replay(
 
     brrt replay run.mcap --at 20ms
 
+    brrt replay run.mcap --text
+
     brrt replay run.mcap --check recordings/circles2d-rrt.mcap
 
     brrt replay run.mcap --at-iteration 400 --rrd first400.rrd
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.recording import read  # noqa: PLC0415
+    from brrt.replay.account import Account  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
     check_output(rrd, "--rrd", ".rrd", force=force)
+    if text and as_json:
+        raise BrrtError("give one of --text and --json")
     limits = limits_of(at, at_event, at_iteration)
     recording = read(run)
     metrics = Metrics(recording.manifest)
     trees = _Trees()
-    sinks: list[Any] = [metrics] if as_json else [metrics, trees]
+    told = Account(recording.manifest, recording.robot()) if text else None
+    sinks: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
     end = feed(Saved(recording, partial=partial, verb=_VERB), sinks, limits)
     if end is not None:
         note_if_beyond(limits, *end)
@@ -90,8 +103,11 @@ def replay(
         verdict = {} if check is None else {"check": {"equal": not difference, "first": difference}}
         print_json({**figures, **verdict})
     else:
-        print_summary(figures)
-        trees.show()
+        if told is None:
+            print_summary(figures)
+            trees.show()
+        else:
+            print_lines(told.lines())
         if golden is not None:
             seeds = [each.manifest.scenario.seed for each in (recording, golden)]
             against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"

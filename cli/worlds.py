@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from .console import Watch, note, out, print_json, print_pairs, print_rows
 from .lists import Json, described, print_described
@@ -12,10 +13,7 @@ from .lists import Json, described, print_described
 if TYPE_CHECKING:
     from brrt.worlds import World
 
-app = typer.Typer(
-    help="List the world generators, show a world, or save one.",
-    invoke_without_command=True,
-)
+app = typer.Typer(invoke_without_command=True)
 Named = Annotated[
     str,
     typer.Argument(
@@ -60,22 +58,39 @@ def list_worlds(
     from brrt.errors import unknown  # noqa: PLC0415 - keep --help fast
     from brrt.worlds import GENERATORS, LOADERS  # noqa: PLC0415
 
-    if name is not None and name not in GENERATORS:
-        raise unknown("world", name, GENERATORS)
-    chosen = dict(GENERATORS) if name is None else {name: GENERATORS[name]}
-    entries = described(chosen)
+    generators, files = described(dict(GENERATORS)), described(dict(LOADERS))
+    for key, loader in LOADERS.items():
+        files[key] |= {"endings": list(loader.endings), "query": loader.queries}
+    entries = {**generators, **files}
+    if name is not None:
+        if name not in entries:
+            raise unknown("world", name, entries)
+        entries = {name: entries[name]}
     if as_json:
         print_json(entries)
         return
     if name is None:
-        overview = [{"name": key, "about": entry["about"]} for key, entry in entries.items()]
-        print_rows(overview, whole=1)
-        out.print()
-    print_described(entries)
+        _print_overview(generators, files)
+    print_described({key: entry for key, entry in entries.items() if entry["params"] or name})
     if name is None:
-        files = ", ".join(LOADERS)
-        out.print(f"Or a file: {files}.", markup=False)
-        out.print("Look at one with brrt worlds show circles2d:n=80,seed=3.", markup=False)
+        for line in (
+            "Look at one: brrt worlds show circles2d:n=80,seed=3, or map.yaml:unknown=free",
+            "Plan in one: brrt plan --world arena.map.scen#12",
+        ):
+            out.print(line, markup=False)
+
+
+def _print_overview(generators: dict[str, Any], files: dict[str, Any]) -> None:
+    print_rows(
+        [{"name": key, "about": entry["about"]} for key, entry in generators.items()], whole=1
+    )
+    out.print()
+    rows = [
+        {"file": key, "about": f["about"], "endings": " ".join(f["endings"])}
+        for key, f in files.items()
+    ]
+    print_rows(rows, whole=1)
+    out.print()
 
 
 @app.command()
@@ -122,8 +137,11 @@ def show(
         return
     out.print(drawing, soft_wrap=True)
     print_pairs(_rows(figures))
-    for path in filter(None, (picture, rrd)):
-        out.print(f"\nwrote {path}", markup=False)
+    if picture is not None:
+        out.print(f"\n{picture}: the picture", markup=False, soft_wrap=True)
+    if rrd is not None:
+        name = escape(str(rrd))
+        out.print(f"\n{name}: look at it with [bold]rerun {name}[/bold]", soft_wrap=True)
 
 
 @app.command()
@@ -148,7 +166,8 @@ def make(
         made = _made(world, start, goal)
         made.save(file)
     what = ", ".join(_counts(_figures(made))) or "no obstacles"
-    out.print(f"{file}: {made.dim}D, {what}; plan in it with --world {file}", markup=False)
+    text = f"{file}: {made.dim}D, {what}; plan in it with --world {file}"
+    out.print(text, markup=False, soft_wrap=True)
 
 
 def _made(spec: str, start: str | None, goal: str | None) -> "World":

@@ -7,6 +7,7 @@ It needs matplotlib: pip install -e '.[plot]'.
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 
@@ -30,7 +31,7 @@ def main() -> None:
     for i, name in enumerate(GENERATORS):
         world = make_world(f"{name}:{SHOWN.get(name, '')}")
         projection = "3d" if world.dim == 3 else None
-        axes = sheet.add_subplot(rows, COLUMNS, i + 1, projection=projection)
+        axes: Any = sheet.add_subplot(rows, COLUMNS, i + 1, projection=projection)
         world.plot(axes)
         axes.set_title(name, fontsize=8)
         if world.dim == 2:

@@ -1,11 +1,13 @@
 """The checks' own geometry, against exact fractions and against points along the way."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from brrt.replay.checks.motions import Obstacles, all_clear, first_hits
+from brrt.replay.checks import scenery
+from brrt.replay.checks.motions import Obstacles, all_clear, first_hits, near
 from brrt.robots import Point
 from brrt.worlds import World
 
@@ -24,6 +26,24 @@ def world_of(rng: np.random.Generator, dim: int, n: int) -> World:
     high = low + rng.integers(0, 3, (n, dim))
     balls = np.concatenate([rng.integers(0, 9, (n, dim)), rng.integers(0, 3, (n, 1))], axis=1)
     return World("", np.zeros(dim), np.full(dim, 10.0), balls, np.concatenate([low, high], axis=1))
+
+
+@given(
+    st.integers(0, 2**32), st.sampled_from([2, 3]), st.integers(1, 400), st.sampled_from([1, 50])
+)
+def test_near_is_every_pair_that_meets(seed: int, dim: int, n: int, batch: int) -> None:
+    """Each once, whatever the sizes, touching included, and however many go at once."""
+    rng = np.random.default_rng(seed)
+    obstacles = Obstacles(world_of(rng, dim, int(rng.integers(1, 40))))
+    low = rng.integers(-2, 12, (n, dim)).astype(float)
+    high = low + rng.integers(0, 8, (n, dim)) // rng.integers(1, 8, (n, 1))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(scenery, "_CANDIDATES", batch)
+        patched.setattr(scenery, "_PAIRS", batch)
+        found = [pair for i, j in near(low, high, obstacles) for pair in zip(i, j, strict=True)]
+    meet = (low[:, None] <= obstacles.upper) & (obstacles.lower <= high[:, None])
+    expected = np.argwhere(meet.all(axis=2)).tolist()
+    assert sorted(map(list, found)) == expected
 
 
 @given(st.integers(0, 2**32), st.sampled_from([2, 3]))

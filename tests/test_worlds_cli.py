@@ -17,7 +17,7 @@ from rerun.chunk import RrdReader
 
 from brrt import GENERATORS, BrrtError, McapSink, Memory, Run, Scenario, World, check, read
 from brrt.colours import GOAL, START, Colour
-from brrt.worlds import Grid, make_world
+from brrt.worlds import LOADERS, Grid, make_world
 
 from .conftest import Result
 
@@ -30,7 +30,9 @@ WORLDS = pytest.mark.parametrize(
 
 def hand_made(**changes: Any) -> World:
     """Every kind of obstacle in 2D, turned cells and a thin line among them."""
-    grid = Grid(np.eye(4, 6, 1, bool), np.array([2.0, 1]), 1.0, 0.3)
+    cells = np.zeros((14, 14), bool)
+    cells[3:9, 4], cells[3, 4:8] = True, True
+    grid = Grid(cells, np.array([2.0, -2]), 1.0, 0.3)
     parts: dict[str, Any] = {
         "name": "mine",
         "lower": np.zeros(2),
@@ -39,8 +41,8 @@ def hand_made(**changes: Any) -> World:
         "balls": np.array([[8.0, 3, 1]]),
         "boxes": np.array([[1.0, 7, 4, 8], [5, 7, 5.05, 11]]),
         "polygons": (np.array([[7.0, 7], [11, 7.5], [8, 10]]), np.array([[4.0, 9], [6, 11]])),
-        "start": np.array([1.0, 11]),
-        "goal": np.array([11.0, 5]),
+        "start": np.array([1.5, 5.5]),
+        "goal": np.array([11.0, 2.5]),
     }
     return World(**{**parts, **changes})
 
@@ -59,7 +61,9 @@ def test_the_list_begins_with_a_line_for_each(brrt: Command) -> None:
         about = (generator.__doc__ or "").split("\n")[0].split()
         assert sum(about[0] in line for line in lines) >= 2, name
     assert "max_corners" in text
-    assert ".map" in text
+    for name, loader in LOADERS.items():
+        assert sum(line.startswith(f"{name} ") for line in lines) >= 1
+        assert all(ending in text for ending in loader.endings)
 
 
 def test_one_generator_alone(brrt: Command) -> None:
@@ -70,7 +74,11 @@ def test_one_generator_alone(brrt: Command) -> None:
     data = brrt("worlds", "list", "polygons2d", "--json").json
     assert list(data) == ["polygons2d"]
     assert {"name", "default", "unit", "range", "doc"} == set(data["polygons2d"]["params"][0])
-    assert list(brrt("worlds", "list", "--json").json) == list(GENERATORS)
+    every = brrt("worlds", "list", "--json").json
+    assert list(every) == [*GENERATORS, *LOADERS]
+    assert every["movingai"]["endings"] == [".map"]
+    assert every["scenarios"]["query"]
+    assert "bucket" in brrt("worlds", "list", "scenarios").out
 
 
 # Looking
@@ -103,12 +111,12 @@ def test_every_kind_of_obstacle_is_counted(brrt: Command) -> None:
     hand_made().save("w.json")
     text = brrt("worlds", "show", "w.json").out
     words = " ".join(text.split())
-    assert "1 circle, 2 rectangles, 1 polygon, 1 line segment, a grid of 4 x 6 cells" in words
-    assert "turned by 0.3 rad, 4 of them blocked" in words
+    assert "1 circle, 2 rectangles, 1 polygon, 1 line segment, a grid of 14 x 14 cells" in words
+    assert "turned by 0.3 rad, 9 of them blocked" in words
     figures = brrt("worlds", "show", "w.json", "--json").json
     assert figures["segments"] == 1
     assert figures["grid"] == {
-        "rows": 4, "columns": 6, "resolution": 1.0, "yaw": 0.3, "blocked": 4
+        "rows": 14, "columns": 14, "resolution": 1.0, "yaw": 0.3, "blocked": 9
     }  # fmt: skip
 
 
@@ -117,7 +125,7 @@ def drawing(text: str) -> list[str]:
     lines = text.splitlines()
     top = next(i for i, line in enumerate(lines) if line[:1] in ("┌", "+"))
     width = 1 + min(lines[top].find(end, 1) for end in "┐+" if lines[top].find(end, 1) > 0)
-    inside = []
+    inside = list[str]()
     for line in lines[top + 1 :]:
         if line[:1] in ("└", "+"):
             return inside
@@ -295,6 +303,13 @@ def test_a_rerun_file_holds_the_world(brrt: Command) -> None:
     assert_refused(brrt("replay", "w.rrd"), "not a recording of brrt")
 
 
+def test_rerun_draws_no_world_beyond_its_numbers(brrt: Command) -> None:
+    """Single precision ends where worlds do not."""
+    World("far", np.zeros(2), np.full(2, 1e90)).save("w.json")
+    assert_refused(brrt("worlds", "show", "w.json", "--rrd", "w.rrd"), "single precision")
+    assert not Path("w.rrd").exists()
+
+
 # Saving
 
 
@@ -342,6 +357,16 @@ def test_a_file_is_never_half_written(brrt: Command, monkeypatch: pytest.MonkeyP
     assert Path("w.json").read_bytes() == before
 
 
+def test_names_are_printed_as_they_are(brrt: Command) -> None:
+    """Brackets are no markup, and a long name is not broken."""
+    name = "[bold]" + 100 * "x"
+    done = brrt("worlds", "make", "circles2d", "--out", f"{name}.json")
+    assert done.out.count(f"{name}.json") == 2
+    done = brrt("worlds", "show", f"{name}.json", "--out", f"{name}.png", "--rrd", f"{name}.rrd")
+    assert f"{name}.png: the picture" in done.out
+    assert done.out.count(f"{name}.rrd") == 2
+
+
 # Bad input
 
 
@@ -370,7 +395,7 @@ def assert_refused(done: Result, *words: str) -> None:
         (("make", "circles2d"), ("--out",)),
         (("make", "circles2d", "--out", "w.txt"), ("--out w.txt", ".json")),
         (("make", "nothing", "--out", "w.json"), ("unknown world 'nothing'",)),
-        (("list", "maze"), ("unknown world 'maze'",)),
+        (("list", "labyrinth"), ("unknown world 'labyrinth'",)),
         (("draw", "circles2d"), ("draw",)),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
@@ -408,7 +433,7 @@ def test_a_world_made_by_hand_is_planned_in(tmp_path: Path) -> None:
     assert metrics.as_dict()["world"] == "my world"
     saved = read(tmp_path / "run.mcap")
     assert saved.world.to_json() == world.to_json()
-    assert check(saved.manifest, saved.world, saved.batches()) == []
+    assert check(saved.manifest, saved.world, memory.events()) == []
 
 
 def test_worlds_are_generated_by_name() -> None:
@@ -432,7 +457,7 @@ def test_a_world_is_described_in_a_line() -> None:
         "<World 'boxes3d:n=10000,max_side=3'; 0, 0, 0 to 100, 100, 100; 10000 boxes; "
         "start 5, 5, 5; goal 95, 95, 95>"
     )
-    assert "4 x 6 cells" in repr(hand_made())
+    assert "14 x 14 cells" in repr(hand_made())
 
 
 def test_a_plot_is_put_where_it_is_asked_for() -> None:

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from brrt.events import Events
+from brrt.replay.account import account
 from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
+from brrt.robots import Robot
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
@@ -30,6 +32,14 @@ class Recording:
     def events(self) -> Events:
         """Return the whole log at once."""
         return Events.concat(self.manifest.dof, self.batches())
+
+    def robot(self) -> Robot:
+        """Make the robot as it was, settled in the world."""
+        return self.manifest.make_robot().settled(self.world)
+
+    def text(self) -> str:
+        """Tell the run in plain text, without times: the same on every machine."""
+        return account(self.manifest, self.robot(), self.batches())
 
     def metrics(self) -> Metrics:
         """Fold the events into the run's figures."""

@@ -191,6 +191,7 @@ _READS = "it reads " + ", ".join(
 __all__ = [
     "GENERATORS",
     "LOADERS",
+    "FileSpec",
     "Generator",
     "Grid",
     "Loader",

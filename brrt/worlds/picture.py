@@ -143,7 +143,7 @@ def _draw_2d(world: World, ax: Any) -> None:
             ax.plot(
                 *point, "o", ms=7, color=rgb(colour), mec="white", mew=0.8, zorder=5, label=name
             )
-    ax.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal")
+    ax.set(xlim=(x0, x1), ylim=(y1, y0) if world.y_down else (y0, y1), aspect="equal")
     ax.tick_params(color=rgb(OUTLINE), labelcolor=rgb(OUTLINE), labelsize=7, width=0.5, length=2.5)
     for spine in ax.spines.values():
         spine.set(color=rgb(OUTLINE), linewidth=0.6)

@@ -128,13 +128,13 @@ def connected(world: World, start: Floats, goal: Floats, cells: int = CELLS) -> 
         goal: Where it should end, shape (d,).
         cells: Cells of the finest lattice.
     """
-    for name, point in (("start", start), ("goal", goal)):
+    ends, grid = np.array([start, goal], np.float64), _map_alone(world)
+    for name, point, hit in zip(("start", "goal"), ends, covered(world, ends), strict=True):
         if not world.inside(point):
             return Connection(False, 0.0, f"the {name} lies outside the bounds")
-        obstacle = world.obstacle_at(point)
-        if obstacle is not None:
+        if hit:
+            obstacle = world.obstacle_at(point) or "an obstacle"
             return Connection(False, 0.0, f"the {name} touches {obstacle}")
-    ends, grid = np.array([start, goal], np.float64), _map_alone(world)
     return _search(world, ends, cells) if grid is None else _search_map(grid, ends)
 
 

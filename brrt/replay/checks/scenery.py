@@ -16,7 +16,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-_GROUP, _GROUPS, _PAIRS, _CELLS = 64, 1024, 8192, 64
+_GROUP, _CANDIDATES, _PAIRS, _CELLS = 64, 1 << 16, 8192, 64
+_WIDTHS = 12
+"""Obstacles are told apart by width down to this many halvings of the map's."""
 
 
 class Obstacles:
@@ -66,6 +68,24 @@ class Obstacles:
         vertices = self.shapes.vertices
         return np.asarray((vertices == vertices[:, :1]).all(axis=1))
 
+    @cached_property
+    def strips(self) -> tuple[int, list[tuple[Ints, Floats, Floats]]]:
+        """Obstacles of about one width, sorted along the map's longest axis.
+
+        Returns:
+            The axis, and for each width: the obstacles' numbers, where each begins, and how far
+            it and those before it reach at most.
+        """
+        axis = int((self.walls[1] - self.walls[0]).argmax())
+        lower, upper = self.lower[:, axis], self.upper[:, axis]
+        _, widths = np.frexp(np.maximum(upper - lower, self.extent * 0.5**_WIDTHS))
+        strips = []
+        for width in np.unique(widths):
+            some = np.flatnonzero(widths == width)
+            some = some[np.argsort(lower[some], kind="stable")]
+            strips.append((some, lower[some], np.maximum.accumulate(upper[some])))
+        return axis, strips
+
     def name(self, j: int) -> str:
         """Name an obstacle as the world numbers it."""
         if j >= len(self):
@@ -94,24 +114,45 @@ def near(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints
     Args:
         low: Least corners, shape (n, d).
         high: Greatest corners, shape (n, d).
-        obstacles: m of them; those far from a whole group of boxes cost one comparison.
+        obstacles: What is in the way; what is far from a group along an axis costs nothing.
     """
     order = np.argsort(_keys((low + high) / 2), kind="stable")
     starts = np.arange(0, len(order), _GROUP)
-    group_low = np.minimum.reduceat(low[order], starts)
-    group_high = np.maximum.reduceat(high[order], starts)
-    for first in range(0, len(starts), _GROUPS):
-        some = slice(first, first + _GROUPS)
-        group, j = np.nonzero(
-            _meet(group_low[some, None], group_high[some, None], obstacles.lower, obstacles.upper)
-        )
+    ends = np.stack([low[order], high[order]])
+    groups = np.minimum.reduceat(ends[0], starts), np.maximum.reduceat(ends[1], starts)
+    # Places left in the last group meet nothing: no comparison with them is true.
+    places = np.full((low.shape[1], 2, len(starts) * _GROUP), np.nan)
+    places[:, :, : len(order)] = ends.transpose(2, 0, 1)
+    members = places.reshape(low.shape[1], 2, len(starts), _GROUP)
+    for group, j in _near_groups(*groups, obstacles):
         for at in range(0, len(group), _PAIRS):
-            rows = (group[at : at + _PAIRS, None] + first) * _GROUP + np.arange(_GROUP)
-            others = np.broadcast_to(j[at : at + _PAIRS, None], rows.shape)
-            inside = rows < len(order)
-            i, k = order[rows[inside]], others[inside]
-            close = _meet(low[i], high[i], obstacles.lower[k], obstacles.upper[k])
-            yield i[close], k[close]
+            some, k = group[at : at + _PAIRS], j[at : at + _PAIRS]
+            close = np.ones((len(some), _GROUP), bool)
+            for axis, (least, most) in enumerate(members):
+                close &= least[some] <= obstacles.upper[k, axis, None]
+                close &= obstacles.lower[k, axis, None] <= most[some]
+            pair, member = np.nonzero(close)
+            yield order[some[pair] * _GROUP + member], k[pair]
+
+
+def _near_groups(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints, Ints]]:
+    """Yield pairs of a box and an obstacle that meet, sorted by box, then obstacle."""
+    axis, strips = obstacles.strips
+    firsts = [np.searchsorted(reach, low[:, axis], side="left") for _, _, reach in strips]
+    lasts = [np.searchsorted(begin, high[:, axis], side="right") for _, begin, _ in strips]
+    counts = [np.maximum(b - a, 0) for a, b in zip(firsts, lasts, strict=True)]
+    batch = np.cumsum(sum(counts)) // _CANDIDATES
+    for rows in np.split(np.arange(len(low)), np.flatnonzero(np.diff(batch)) + 1):
+        pairs = []
+        for (numbers, _, _), first, count in zip(strips, firsts, counts, strict=True):
+            n = count[rows]
+            offset = first[rows] - (np.cumsum(n) - n)
+            pairs.append((np.repeat(rows, n), numbers[np.repeat(offset, n) + np.arange(n.sum())]))
+        box, j = (np.concatenate(side) for side in zip(*pairs, strict=True))
+        meet = _meet(low[box], high[box], obstacles.lower[j], obstacles.upper[j])
+        box, j = box[meet], j[meet]
+        order = np.lexsort((j, box))
+        yield box[order], j[order]
 
 
 def _meet(low: Floats, high: Floats, other_low: Floats, other_high: Floats) -> Flags:

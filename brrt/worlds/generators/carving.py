@@ -27,6 +27,8 @@ def without(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
         if last[axis] < high[axis]:
             boxes.append([*np.where(np.arange(len(low)) == axis, last, low), *high])
         low[axis], high[axis] = first[axis], last[axis]
+        if low[axis] == high[axis]:
+            break
     return np.array(boxes).reshape(-1, 2 * len(low))
 
 

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -71,7 +71,8 @@ class Generator(Settings):
             room: Distance to keep from the walls, when that is more.
             most: The distance is never more than this, as a fraction of the size.
         """
-        part = max(_MARGIN, min(CLEARANCE + room / self.size, most) if room else 0.0)
+        clearance = CLEARANCE * self.size + room
+        part = max(_MARGIN, min(clearance / self.size, most) if room else 0.0)
         return np.full(self.dim, part * self.size), np.full(self.dim, (1 - part) * self.size)
 
     def make(
@@ -108,6 +109,9 @@ class Generator(Settings):
                 if not self.connected:
                     return world
                 found = connected(world, start, goal)
+                if found.connected and draws:
+                    note = f"connected asked for: draw {draws + 1} is the first with a way"
+                    return replace(world, notes=(*world.notes, note))
                 if found.connected:
                     return world
                 draws, reason = draws + 1, found.reason

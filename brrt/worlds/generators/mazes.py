@@ -102,7 +102,9 @@ class Maze(Seeded):
         """Check that corridors and walls fit the map."""
         Seeded.__post_init__(self)
         if self.corridor is not None and self.wall is not None:
-            raise BrrtError("size, cells and either of corridor and wall say the other; give one")
+            raise BrrtError(
+                "corridor and wall follow from each other, size and cells; give one of them"
+            )
         if self.corridor is not None and self.corridor * self.cells >= self.size:
             raise BrrtError(
                 f"corridor {self.corridor:g} leaves no room for walls between {self.cells} cells; "

@@ -1,4 +1,4 @@
-"""Worlds drawn from a seed: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
+"""Obstacles all over the map: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
