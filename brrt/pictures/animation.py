@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -105,13 +106,13 @@ def instants(history: History, pace: Pace) -> tuple[NDArray[np.int64], list[floa
     The number of events rises as the square of the time, so that the first ones are seen one by
     one; what comes after planning gets a part of its own.
     """
-    wanted = max(2, round(pace.seconds * pace.fps))
+    wanted = max(3, round(pace.seconds * pace.fps))
     nodes = history.nodes(history.last)
     most = max(_FEWEST_FRAMES, 2 * _MOST_EDGES // max(nodes, 1))
     frames = min(wanted, most)
     last, planned = history.last, history.planned
     after = last > planned
-    growing = max(2, round(frames * (_PLANNING if after else 1.0)))
+    growing = max(2, int(frames * _PLANNING)) if after else frames
     seqs = np.linspace(0, 1, growing) ** 2 * planned
     if after:
         seqs = np.concatenate([seqs, np.linspace(planned, last, frames - growing + 1)[1:]])
@@ -189,7 +190,7 @@ def _write_gif(frames: Iterator[Pixels], seconds: list[float], path: Path) -> No
 
 
 def _palette() -> Pixels:
-    """Return white and black, and each colour in use from whole to faint, shape (n, 3).
+    """Return white, and each colour in use from whole to faint, shape (n, 3).
 
     A palette made from the frames would leave out what is small, like the start and the goal.
     """
@@ -197,11 +198,11 @@ def _palette() -> Pixels:
 
     trees = [colour for number in (0, 1, 2) for colour in style.tree_style(number)[1:]]
     others = [style.START, style.GOAL, style.RAW, style.SMOOTHED, style.REJECTED, style.QUIET,
-              style.ROBOT, rgb(OBSTACLE_3D)]  # fmt: skip
+              style.ROBOT, rgb(OBSTACLE_3D), rgb(OBSTACLE)]  # fmt: skip
     full = np.array([*trees, *others])[:, None]
     faint = 1 - (1 - full) * np.array([1.0, 0.75, 0.5, 0.25])[:, None]
     heat = colormaps[style.HEAT](np.linspace(0, 1, 48))[:, :3]
-    colours = np.concatenate([[[1, 1, 1], rgb(OBSTACLE)], faint.reshape(-1, 3), heat])
+    colours = np.concatenate([[[1, 1, 1]], faint.reshape(-1, 3), heat])
     return np.unique((255 * colours).round().astype(np.uint8), axis=0)
 
 
@@ -222,12 +223,11 @@ def _write_mp4(frames: Iterator[Pixels], seconds: list[float], path: Path) -> No
         )
         assert process.stdin is not None  # noqa: S101 - it is a pipe
         try:
-            process.stdin.write(first.tobytes())
-            for frame in frames:
-                process.stdin.write(frame.tobytes())
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # it has ended, and says why
+            # If it ends before it has read everything, its exit code and its words say why.
+            with suppress(BrokenPipeError), process.stdin:
+                process.stdin.write(first.tobytes())
+                for frame in frames:
+                    process.stdin.write(frame.tobytes())
         except BaseException:
             process.kill()
             raise

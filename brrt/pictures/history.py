@@ -74,7 +74,7 @@ class History:
 
     def __init__(self, record: Record) -> None:
         self._events, self._manifest = record.events, record.manifest
-        self.robot = record.manifest.make_robot()
+        self.robot = record.manifest.make_robot().settled(record.world)
         self._places: dict[int, Floats] = {}
         self._changes: dict[int, Changes] = {}
         for number, tree in forest(record.events).items():
