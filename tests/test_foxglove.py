@@ -193,9 +193,9 @@ def test_a_seek_shows_the_cells(name: str, shown: Callable[[str], Shown]) -> Non
         want = Counter(
             (
                 *np.float32(q).astype(float).tolist(),
-                *((colour >> shift & 255) for shift in (24, 16, 8)),
+                *((c >> shift & 255) for shift in (24, 16, 8)),
             )
-            for (q, _), colour in zip(cells.values(), packed, strict=True)
+            for (q, _), c in zip(cells.values(), packed, strict=True)
         )
         got: Counter[tuple[float, ...]] = Counter()
         for marker in export.at(t, "/viz/cells/"):
