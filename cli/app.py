@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import typer
 
 from .console import Code, complain
+from .export import export
 from .lists import planners, robots
 from .plan import plan
 from .plot import plot
@@ -31,6 +32,8 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]rerun run.rrd[/bold] shows the tree as it grows
 
+[bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
+
 [bold]brrt planners[/bold] lists what there is to set
 
 Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 interrupted.""",
@@ -40,6 +43,7 @@ app.command()(plan)
 app.command()(replay)
 app.command()(plot)
 app.command()(verify)
+app.command()(export)
 app.command()(planners)
 app.command()(robots)
 app.add_typer(worlds, name="worlds")
