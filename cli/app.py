@@ -12,6 +12,7 @@ from .plan import plan
 from .plot import plot
 from .replay import replay
 from .verify import verify
+from .view import view
 from .worlds import app as worlds
 
 app = typer.Typer(
@@ -30,7 +31,7 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
 
-[bold]rerun run.rrd[/bold] shows the tree as it grows
+[bold]brrt view run.mcap[/bold] shows the tree as it grows
 
 [bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
 
@@ -44,6 +45,7 @@ app.command()(replay)
 app.command()(plot)
 app.command()(verify)
 app.command()(export)
+app.command()(view)
 app.command()(planners)
 app.command()(robots)
 app.add_typer(worlds, name="worlds")
