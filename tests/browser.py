@@ -84,7 +84,7 @@ def browser(folder: Path, size: tuple[int, int], seconds: int) -> Iterator[Page]
         os.dup2(high[1], 4)
 
     process = subprocess.Popen(
-        ["timeout", "-k", "2", str(seconds), CHROMIUM, *_OPTIONS, f"--user-data-dir={folder}"],
+        ["timeout", "-k", "2", str(seconds), CHROMIUM, *_OPTIONS, f"--user-data-dir={folder}"],  # noqa: S607
         preexec_fn=hand_over,  # noqa: PLW1509 - there is no other way to give it files 3 and 4
         close_fds=False,
         start_new_session=True,

@@ -76,7 +76,7 @@ def test_map_server(tmp_path: Path) -> None:
     assert grid.cells.tolist() == [[False, False, True], [True, False, True]]
     assert (grid.origin.tolist(), grid.resolution, grid.yaw) == ([1, 2], 0.5, 0.5)
     (note,) = world.notes
-    assert note.startswith(f"{path}: 2 of 6 cells are unknown and count as blocked; m.yaml:unknown")
+    assert note.startswith(f"{path}: 2 of 6 cells are unknown and count as blocked; {path}:unknown")
     free = make_world(f"{path}:unknown=free")
     assert grid_of(free).cells.tolist() == [[False, False, False], [True, False, False]]
     assert "count as free" in free.notes[0]

@@ -113,7 +113,7 @@ class GeoJson(Loader):
         if margin is None:
             margin = 0.0 if box is not None else float((upper - lower).max()) / 10
         if not (lower - margin < upper + margin).all():
-            raise BrrtError(f"{path}: its bounds span no area; give room: {path.name}:margin=1")
+            raise BrrtError(f"{path}: its bounds span no area; give room: {path}:margin=1")
         return lower - margin, upper + margin
 
 

@@ -17,7 +17,9 @@ class JsonWorld(Loader):
     @classmethod
     def recognises(cls, head: bytes) -> bool:
         """Whether the schema stands near the beginning, where it is written."""
-        return re.search(rb'"schema"\s*:\s*"brrt\.world"', head) is not None
+        return head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{") and bool(
+            re.search(rb'"schema"\s*:\s*"brrt\.world"', head)
+        )
 
     def load(self, path: Path, query: str) -> World:
         """Read a world.
