@@ -189,13 +189,13 @@ def test_a_tree_that_rewires_is_drawn_as_it_was_then(brrt: Command) -> None:
     first, then = (
         picture_of(brrt, "circles2d-rrt-star", "--at-event", seq) for seq in (early, last)
     )
-    paths = [np.asarray(row["waypoints"]) for row in log[Kind.PATH]]
+    paths = [np.asarray(row["waypoints"]) for row in log[Kind.PATH][-2:]]
     lines = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]
-    others = then.drawn(np.concatenate([along(after), *map(along, lines)]), 5)
+    others = then.drawn(np.concatenate([along(after), *map(along, lines)]), 3)
     alone = gone[~others[tuple(then.pixels(gone).T)]]
-    assert len(alone) > 300
+    assert len(alone) > 100
     assert first.near(first.blue, alone).mean() > 0.95
-    assert then.near(then.blue, alone).mean() < 0.02
+    assert then.near(then.blue, alone).mean() < 0.05
 
 
 def test_paths_are_drawn_in_gold(brrt: Command) -> None:

@@ -13,7 +13,7 @@ from brrt.events import Kind
 from brrt.pictures import style
 from brrt.pictures.curves import Against, draw_cost, draw_time
 from brrt.pictures.history import Record
-from brrt.pictures.tree import MOST_VECTORS, TreePanel
+from brrt.pictures.tree import TreePanel
 from brrt.worlds.picture import need_matplotlib, new_axes, save_figure
 
 PANELS = ("tree", "cost", "time")
@@ -130,9 +130,6 @@ def height_of_tree(record: Record, width: float) -> float:
 def _add_tree(part: Any, record: Record, look: Look) -> None:
     panel = tree_panel(part, record, look)
     panel.show(panel.history.last)
-    for artist in panel.moving:
-        if hasattr(artist, "get_segments"):
-            artist.set_rasterized(len(artist.get_paths()) > MOST_VECTORS)
     marks = panel.legend()
     rows = -(-len(marks) // _LEGEND_COLUMNS)
     columns = -(-len(marks) // rows)
