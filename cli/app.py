@@ -6,11 +6,13 @@ from collections.abc import Sequence
 import typer
 
 from .console import Code, complain
+from .export import export
 from .lists import planners, robots
 from .plan import plan
 from .plot import plot
 from .replay import replay
 from .verify import verify
+from .view import view
 from .worlds import app as worlds
 
 app = typer.Typer(
@@ -29,7 +31,9 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
 
-[bold]rerun run.rrd[/bold] shows the tree as it grows
+[bold]brrt view run.mcap[/bold] shows the tree as it grows
+
+[bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
 
 [bold]brrt planners[/bold] lists what there is to set
 
@@ -40,6 +44,8 @@ app.command()(plan)
 app.command()(replay)
 app.command()(plot)
 app.command()(verify)
+app.command()(export)
+app.command()(view)
 app.command()(planners)
 app.command()(robots)
 app.add_typer(worlds, name="worlds")

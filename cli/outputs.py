@@ -36,5 +36,22 @@ def check_display(*, view: bool) -> None:
     Raises:
         BrrtError: There is no display; Rerun would wait for its viewer for ever.
     """
-    if view and sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+    if view and not _has_display():
         raise BrrtError("--view needs a display and there is none; use --rrd instead")
+
+
+def check_window() -> None:
+    """See that `brrt view` can open a window.
+
+    Raises:
+        BrrtError: There is no display.
+    """
+    if not _has_display():
+        raise BrrtError(
+            "the viewer's window needs a display and there is none; look with the browser (--web) "
+            "or take a picture (--screenshot x.png)"
+        )
+
+
+def _has_display() -> bool:
+    return sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())

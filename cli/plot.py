@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from .console import Watch, out
-from .instant import feed, limits_of, note_if_beyond
+from .console import Watch, note, out
+from .instants import At, AtEvent, AtIteration, beyond, feed, instant
 from .saved import Saved
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PICTURES, ANIMATIONS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
 _VERB = "draw them"
-_INSTANT, _LOOKS, _FILM = "Instant", "Looks", "Animation"
+_LOOKS, _FILM = "Looks", "Animation"
 
 
 def plot(
@@ -38,22 +38,9 @@ def plot(
             show_default=False,
         ),
     ] = None,
-    at: Annotated[
-        str | None,
-        typer.Option(
-            help="As it stood at this time of the run, as 1.5s, 20ms or 300us.",
-            metavar="TIME",
-            rich_help_panel=_INSTANT,
-        ),
-    ] = None,
-    at_event: Annotated[
-        int | None,
-        typer.Option(help="As it stood after this event.", rich_help_panel=_INSTANT),
-    ] = None,
-    at_iteration: Annotated[
-        int | None,
-        typer.Option(help="As it stood after this iteration.", rich_help_panel=_INSTANT),
-    ] = None,
+    at: At = None,
+    at_event: AtEvent = None,
+    at_iteration: AtIteration = None,
     against: Annotated[
         str | None,
         typer.Option(
@@ -130,7 +117,7 @@ def plot(
         raise BrrtError(f"--against must be time or iterations, not {against!r}")
     if moves and (len(runs) > 1 or panels not in ([], ["tree"])):
         raise BrrtError(f"--out {picture}: an animation shows the tree of one run")
-    limits = limits_of(at, at_event, at_iteration)
+    limits = instant(at, at_event, at_iteration)
 
     from brrt.pictures.animation import DPI, Pace, need_ffmpeg, save_animation  # noqa: PLC0415
     from brrt.pictures.figure import Look, save_plot  # noqa: PLC0415
@@ -186,7 +173,9 @@ def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "lis
         recording, memory = read(run), Memory()
         end = feed(Saved(recording, partial=partial, verb=_VERB), [memory], limits)
         if end is not None:
-            note_if_beyond(limits, *end)
+            late = beyond(limits, *end)
+            if late is not None:
+                note(f"{late}; this is how it stood then")
         name = run.stem if names[run.stem] == 1 else str(run.with_suffix(""))
         events = Events.concat(recording.manifest.dof, memory.batches)
         records.append(Record(name, recording.manifest, recording.world, events))

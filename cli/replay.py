@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, out, print_json, print_lines, print_rows, print_summary
-from .instant import feed, limits_of, note_if_beyond
+from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
+from .instants import At, AtEvent, AtIteration, beyond, feed, instant
 from .saved import Saved
 
 if TYPE_CHECKING:
@@ -18,22 +18,9 @@ _VERB = "replay them"
 
 def replay(
     run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
-    at: Annotated[
-        str | None,
-        typer.Option(
-            help="As it stood at this time of the run, as 1.5s, 20ms or 300us.",
-            metavar="TIME",
-            rich_help_panel="Instant",
-        ),
-    ] = None,
-    at_event: Annotated[
-        int | None,
-        typer.Option(help="As it stood after this event.", rich_help_panel="Instant"),
-    ] = None,
-    at_iteration: Annotated[
-        int | None,
-        typer.Option(help="As it stood after this iteration.", rich_help_panel="Instant"),
-    ] = None,
+    at: At = None,
+    at_event: AtEvent = None,
+    at_iteration: AtIteration = None,
     check: Annotated[
         Path | None,
         typer.Option(
@@ -79,7 +66,7 @@ def replay(
     check_output(rrd, "--rrd", ".rrd", force=force)
     if text and as_json:
         raise BrrtError("give one of --text and --json")
-    limits = limits_of(at, at_event, at_iteration)
+    limits = instant(at, at_event, at_iteration)
     recording = read(run)
     metrics = Metrics(recording.manifest)
     trees = _Trees()
@@ -87,7 +74,9 @@ def replay(
     sinks: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
     end = feed(Saved(recording, partial=partial, verb=_VERB), sinks, limits)
     if end is not None:
-        note_if_beyond(limits, *end)
+        late = beyond(limits, *end)
+        if late is not None:
+            note(f"{late}; this is how it stood then")
     if rrd is not None:
         from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
 

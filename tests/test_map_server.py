@@ -157,8 +157,12 @@ def test_strange_fields_are_said(tmp_path: Path) -> None:
     """A field that maps do not have may be a misspelt one."""
     (tmp_path / "image.pgm").write_bytes(PGM)
     path = tmp_path / "m.yaml"
+    path.write_text(YAML + "".join(f'"\\n{i}{"x" * 100}": 1\n' for i in range(50)))
+    notes = load_world(path).notes
+    assert len(notes) == 10
+    assert all(note.isprintable() and len(note) < len(str(path)) + 90 for note in notes)
     path.write_text(YAML + "modus: raw\n")
-    assert load_world(path).notes == (f"{path}:7: modus: no field of a map; left out",)
+    assert load_world(path).notes == (f"{path}:7: 'modus' is no field of a map; left out",)
 
 
 def test_the_image_may_be_named_by_the_user(tmp_path: Path) -> None:

@@ -36,18 +36,44 @@ def log_mark(
 ) -> None:
     """Mark a place, shape (1, d), and write a name below."""
     rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
+    log_label(rec, world, name, place, colour, name)
+
+
+def log_label(
+    rec: rr.RecordingStream,
+    world: World,
+    name: str,
+    place: NDArray[np.float32],
+    colour: Colour,
+    text: str,
+    far: float = 0.012,
+) -> None:
+    """Write a text below a place, shape (1, d), so far as a part of the world's extent."""
     # Rerun writes a label across its point; this one stands below.
     down = np.eye(world.dim, dtype=np.float32)[-1] * (1 if world.y_down else -1)
-    below = place + np.float32(0.012 * world.extent) * down
-    rec.log(f"/world/{name}/label", _label(below, colour, name), static=True)
+    below = place + np.float32(far * world.extent) * down
+    rec.log(f"/world/{name}/label", _label(below, colour, text), static=True)
 
 
-def world_view(world: World, overrides: Mapping[str, Any] | None = None) -> Any:
-    """Lay out a view of the world and of what happens in it; the whole of it is in sight."""
+def world_view(
+    world: World,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    below: str = "",
+    name: str = "World",
+) -> Any:
+    """Lay out a view of the world and of what happens in it; the whole of it is in sight.
+
+    Args:
+        world: The world.
+        overrides: What the view changes of its entities.
+        below: The entity below which the world was drawn.
+        name: The view's.
+    """
     options: dict[str, Any] = {
         "origin": "/",
-        "contents": "/world/**",
-        "name": "World",
+        "contents": f"{below}/world/**",
+        "name": name,
         "background": list(FREE),
         "overrides": overrides or {},
     }

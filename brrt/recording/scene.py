@@ -164,29 +164,15 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
         world: The run's.
         live: Follow what comes, instead of waiting at the start.
     """
-    axis = rrb.TimeAxis(
-        view_range=rr.TimeRange(
-            start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
-        )
-    )
-    plots = [
-        rrb.TimeSeriesView(origin=f"/series/{entity}", name=name, axis_x=axis)
-        for entity, name in (
-            ("nodes", "Nodes"),
-            ("cost", "Path cost"),
-            ("extensions", "Extensions, %"),
-            ("pace", "Time an iteration, us"),
-        )
-    ]
     log = rrb.TextLogView(
         origin="/log",
         name="Log",
         columns=rrb.TextLogColumns(timeline_columns=["iteration"], text_log_columns=["body"]),
     )
     run = rrb.TextDocumentView(origin="/run", name="Run")
-    right = rrb.Vertical(*plots, log, run, row_shares=[3, 3, 3, 3, 4, 5])
+    right = rrb.Vertical(*plots(), log, run, row_shares=[3, 3, 3, 3, 4, 5])
     return rrb.Blueprint(
-        rrb.Horizontal(_world_view(world), right, column_shares=[5, 2]),
+        rrb.Horizontal(world_view(world), right, column_shares=[5, 2]),
         rrb.TimePanel(
             state="collapsed",
             # A robot that drives the path afterwards does so within the planner's last iteration.
@@ -199,7 +185,37 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
     )
 
 
-def _world_view(world: World) -> Any:
+def plots(*below: str) -> list[rrb.TimeSeriesView]:
+    """Lay out the plots of a run, or of several that were drawn below some entities."""
+    axis = rrb.TimeAxis(
+        view_range=rr.TimeRange(
+            start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
+        )
+    )
+    return [
+        rrb.TimeSeriesView(
+            origin="/" if below else f"/series/{entity}",
+            contents=[f"{each}/series/{entity}/**" for each in below] or "$origin/**",
+            name=name,
+            axis_x=axis,
+        )
+        for entity, name in (
+            ("nodes", "Nodes"),
+            ("cost", "Path cost"),
+            ("extensions", "Extensions, %"),
+            ("pace", "Time an iteration, us"),
+        )
+    ]
+
+
+def world_view(world: World, *, below: str = "", name: str = "World") -> Any:
+    """Lay out a view of a run; what is shown for a moment and what stays is set here.
+
+    Args:
+        world: The world.
+        below: The entity below which the run was drawn.
+        name: The view's.
+    """
     past = [(name, rrb.TimeRangeBoundary.infinite()) for name in ("iteration", "event", "t")]
     recent = [
         ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS)),
@@ -216,8 +232,8 @@ def _world_view(world: World) -> Any:
     shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
-    overrides = {entity: [_ranges(starts)] for entity, starts in shown.items()}
-    return landscape.world_view(world, overrides)
+    overrides = {f"{below}{entity}": [_ranges(starts)] for entity, starts in shown.items()}
+    return landscape.world_view(world, overrides, below=below, name=name)
 
 
 def _ranges(starts: list[tuple[str, Any]]) -> Any:

@@ -15,9 +15,17 @@ APPLICATION = "brrt"
 PORT = 9876
 
 
-def address() -> str:
+def address(port: int | None = None) -> str:
     """Where a viewer listens."""
-    return f"rerun+http://127.0.0.1:{PORT}/proxy"
+    return f"rerun+http://127.0.0.1:{PORT if port is None else port}/proxy"
+
+
+def program() -> str | None:
+    """Return the viewer's own file: the script `rerun` is a wrapper whose child outlives it."""
+    own = importlib.util.find_spec("rerun_cli")
+    folder = None if own is None or own.origin is None else str(Path(own.origin).parent)
+    # Rerun looks for its viewer on the PATH alone, where a venv that is not activated is missing.
+    return shutil.which("rerun", path=folder) or shutil.which("rerun")
 
 
 def open_viewer(rec: rr.RecordingStream) -> None:
@@ -26,10 +34,6 @@ def open_viewer(rec: rr.RecordingStream) -> None:
     Raises:
         RecordingError: There is none.
     """
-    own = importlib.util.find_spec("rerun_cli")
-    folder = None if own is None or own.origin is None else str(Path(own.origin).parent)
-    # Rerun looks for its viewer on the PATH alone, where a venv that is not activated is missing.
-    program = shutil.which("rerun", path=folder) or shutil.which("rerun")
     try:
         # Without a recording that is enabled, `spawn` does nothing.
         with _nothing_to_inherit():
@@ -37,7 +41,7 @@ def open_viewer(rec: rr.RecordingStream) -> None:
                 port=PORT,
                 connect=False,
                 hide_welcome_screen=True,
-                executable_path=program,
+                executable_path=program(),
                 recording=rec,
             )
     except RuntimeError as error:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, unknown
 from brrt.files import replacing
 from brrt.settings import pairs
-from brrt.worlds.convex import GREATEST, convex_polygon, gap
+from brrt.worlds.convex import GREATEST, convex_polygons, gap
 from brrt.worlds.occupancy import Grid
 
 SCHEMA, VERSION, VERSION_WITH_GRID = "brrt.world", 1, 2
@@ -58,7 +58,7 @@ def _polygons(values: Any, dim: int) -> tuple[Floats, ...]:
         raise BrrtError("world: polygons must be a list of polygons, each a list of vertices")
     if len(values) and dim != 2:
         raise BrrtError(f"world: polygons stand in the plane, and this world is {dim}D; use boxes")
-    return tuple(convex_polygon(f"world: polygons[{i}]", v) for i, v in enumerate(values))
+    return convex_polygons("world: polygons", list(values))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,224 @@
+"""Two runs in one picture: side by side, their plots over each other, and where they part."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from brrt.colours import Colour
+from brrt.events import Events, Kind
+from brrt.recording import landscape, scene, viewer
+from brrt.recording.canvas import moments
+from brrt.recording.columns import time_columns
+from brrt.recording.drain import Drain
+from brrt.recording.drawing import Drawing
+from brrt.replay.diff import Difference, first_difference
+from brrt.scenario import Manifest
+from brrt.worlds.world import World
+
+MARK: Colour = (255, 64, 216)
+"""Where two runs part; like nothing else in the picture."""
+LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
+"""Of the plots, for each run."""
+_SHADES = 0.12
+"""How much lighter each further line of a run is in one plot."""
+_RING = 0.02
+"""Radius of the ring around the place where they part, as a part of the world's extent."""
+_CIRCLE = np.linspace(0, 2 * np.pi, 49)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One of two runs.
+
+    Attributes:
+        name: What it is called in the picture.
+        manifest: Its manifest.
+        world: Its world.
+        events: Its whole log.
+    """
+
+    name: str
+    manifest: Manifest
+    world: World
+    events: Events
+
+
+def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
+    """Draw two runs into an .rrd file: the first below `/A`, the second below `/B`.
+
+    The file is for the eye: the exact events stay in the recordings.
+
+    Args:
+        path: The file; it is overwritten.
+        left: The first run.
+        right: The second run.
+
+    Returns:
+        The first event that is not the same in both, times apart; None if there is none.
+
+    Raises:
+        RecordingError: The file cannot be written.
+    """
+    difference = first_difference([left.events], [right.events])
+    rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
+    rec: Any = rr.RecordingStream(viewer.APPLICATION, recording_id="pair", send_properties=False)
+    rr.set_log_time_enabled(False, recording=rec)
+    drain = Drain(path)
+    try:
+        try:
+            rec.set_sinks(rr.FileSink(drain.inlet), default_blueprint=_layout(left, right))
+        finally:
+            drain.leave()
+        for letter, side, colour in zip("AB", (left, right), LINES, strict=True):
+            branch: Any = _Branch(rec, f"/{letter}", letter, colour)
+            _draw(branch, side)
+            if difference is not None:
+                other = difference.right if side is left else difference.left
+                _mark(branch, side, difference.seq, other)
+        if difference is not None:
+            _tell(rec, max(left, right, key=lambda side: len(side.events)), difference)
+        rec.flush()
+    finally:
+        rec.disconnect()
+        drain.close()
+    return difference
+
+
+class _Branch:
+    """A recording below an entity; its plots have a colour of their own.
+
+    Args:
+        rec: The recording.
+        below: The entity.
+        name: Stands before the names of plots.
+        colour: Of the first line of each plot.
+    """
+
+    def __init__(self, rec: rr.RecordingStream, below: str, name: str, colour: Colour) -> None:
+        self._rec, self._below, self._name, self._colour = rec, below, name, colour
+        self._lines: dict[str, list[str]] = {}
+
+    def log(self, entity: str, archetype: Any, *, static: bool = False) -> None:
+        """Log below the entity."""
+        if isinstance(archetype, rr.SeriesLines):
+            archetype = self._line(entity)
+        elif isinstance(archetype, rr.SeriesPoints):
+            archetype = rr.SeriesPoints(names=self._name, colors=self._colour, marker_sizes=3)
+        self._rec.log(f"{self._below}{entity}", archetype, static=static)
+
+    def send_columns(self, entity: str, indexes: Any, columns: Any) -> None:
+        """Send columns below the entity."""
+        self._rec.send_columns(f"{self._below}{entity}", indexes, columns)
+
+    def _line(self, entity: str) -> rr.SeriesLines:
+        plot, _, name = entity.removeprefix("/series/").partition("/")
+        lines = self._lines.setdefault(plot, [])
+        if name not in lines:
+            lines.append(name)
+        light = 1 - (1 - _SHADES) ** lines.index(name)
+        colour = [round(value + light * (255 - value)) for value in self._colour]
+        text = f"{self._name} {name}".replace("_", " ").strip()
+        return rr.SeriesLines(names=text, colors=colour, widths=1.5)
+
+
+def _draw(branch: Any, side: Side) -> None:
+    drawing = Drawing(branch, side.manifest, side.world)
+    drawing.write(side.events)
+    drawing.close()
+    text = f"**{side.name}**\n\n{scene.document(side.manifest)}"
+    branch.log("/run", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def _mark(branch: Any, side: Side, seq: int, other: Mapping[str, Any] | None) -> None:
+    """Draw a ring around the place where the runs part, at all times: it is what one looks for."""
+    robot = side.manifest.make_robot()
+    place = scene.places([_place(side, seq, other)], robot)
+    radius = _RING * side.world.extent
+    if side.world.dim == 2:
+        ring = place + radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
+        shape: Any = rr.LineStrips2D([ring], colors=MARK, radii=-2, draw_order=110)
+    else:
+        shape = rr.Ellipsoids3D(
+            centers=place, radii=[radius], colors=MARK, fill_mode="MajorWireframe", line_radii=-1
+        )
+    branch.log("/world/difference", shape, static=True)
+    text = f"first difference: event {seq}"
+    landscape.log_label(branch, side.world, "difference", place, MARK, text, _RING + 0.012)
+
+
+def _place(side: Side, seq: int, other: Mapping[str, Any] | None) -> NDArray[np.float64]:
+    """Return the configuration that an event is about; without one, the newest before.
+
+    Args:
+        side: The run.
+        seq: The event's number.
+        other: The other run's event, to find the waypoint at which two paths part.
+    """
+    until = side.events.until(seq=seq)
+    newest = {kind: table[-1] for kind, table in until.tables.items()}
+    if not newest:
+        return np.array(side.manifest.start)
+    kind, row = max(newest.items(), key=lambda item: int(item[1]["seq"]))
+    if kind is Kind.PATH:
+        theirs = () if other is None else other.get("waypoints", ())
+        pairs = zip(row["waypoints"], theirs, strict=False)
+        parted = (i for i, (ours, their) in enumerate(pairs) if (ours != their).any())
+        return np.asarray(row["waypoints"][next(parted, -1)])
+    if kind in (Kind.REWIRE, Kind.CONNECT):
+        edges = until[Kind.EDGE]
+        tree = row["tree"] if kind is Kind.REWIRE else 0
+        return np.asarray(edges["q"][(edges["tree"] == tree) & (edges["node"] == row["node"])][0])
+    placed = [each for each in newest.values() if "q" in (each.dtype.names or ())]
+    if not placed:
+        return np.array(side.manifest.start)
+    return np.asarray(max(placed, key=lambda each: int(each["seq"]))["q"])
+
+
+def _tell(rec: Any, side: Side, difference: Difference) -> None:
+    """Write to the log where the runs part."""
+    until = side.events.until(seq=difference.seq)
+    last = max((table[-1] for table in until.tables.values()), key=lambda row: int(row["seq"]))
+    told = rr.TextLog.columns(text=[f"the runs part at {difference}"], level=["WARN"])
+    rec.send_columns("/difference", time_columns(moments([last])), told)
+
+
+def _title(side: Side) -> str:
+    scenario = side.manifest.scenario
+    return f"{side.name} ({scenario.planner}, seed {scenario.seed})"
+
+
+def _layout(left: Side, right: Side) -> rrb.Blueprint:
+    worlds = [
+        scene.world_view(side.world, below=f"/{letter}", name=f"{letter}: {_title(side)}")
+        for letter, side in (("A", left), ("B", right))
+    ]
+    log = rrb.TextLogView(
+        origin="/",
+        contents=["/difference", "/A/log", "/B/log"],
+        name="Log",
+        columns=rrb.TextLogColumns(
+            timeline_columns=["iteration"], text_log_columns=["entitypath", "body"]
+        ),
+    )
+    runs = [rrb.TextDocumentView(origin=f"/{each}/run", name=each) for each in "AB"]
+    below = rrb.Horizontal(
+        *scene.plots("/A", "/B"), log, rrb.Tabs(*runs), column_shares=[3, 3, 3, 5, 4]
+    )
+    driven = any(side.manifest.scenario.execute for side in (left, right))
+    return rrb.Blueprint(
+        rrb.Vertical(rrb.Horizontal(*worlds), below, row_shares=[7, 3]),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline="event" if driven else "iteration",
+            play_state="paused",
+            fps=100,
+        ),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
