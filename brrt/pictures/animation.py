@@ -128,7 +128,7 @@ def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     width = look.width or style.COLUMN_IN + 0.01
-    size = width, height_of_tree(record, width) - 0.35  # there is no legend
+    size = width, height_of_tree(record, width, legend=False)
     if max(size) * look.dpi > _MOST_PIXELS:
         raise BrrtError(
             f"{max(size) * look.dpi:.0f} pixels are too many for an animation, which has at most "
