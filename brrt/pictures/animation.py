@@ -33,7 +33,7 @@ _PLANNING = 0.85
 """Part of the frames in which the planner is at work, where anything happens afterwards."""
 _HOLD_S = 1.5
 """How long the last frame stays."""
-_FEWEST_FRAMES, _MOST_EDGES = 24, 4_000_000
+_FEWEST_FRAMES, _MOST_EDGES = 24, 2_000_000
 """Edges drawn over all frames, about: beyond that there are fewer frames, of the same seconds."""
 _MOST_BYTES = 5_000_000
 """Of a .gif; one that is larger loses frames."""
@@ -128,7 +128,7 @@ def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     width = look.width or style.COLUMN_IN + 0.01
-    size = width, height_of_tree(record, width) - 0.35  # there is no legend
+    size = width, height_of_tree(record, width, legend=False)
     if max(size) * look.dpi > _MOST_PIXELS:
         raise BrrtError(
             f"{max(size) * look.dpi:.0f} pixels are too many for an animation, which has at most "

@@ -13,11 +13,11 @@ from brrt.events import Kind
 from brrt.pictures import style
 from brrt.pictures.curves import Against, draw_cost, draw_time
 from brrt.pictures.history import Record
-from brrt.pictures.tree import MOST_VECTORS, TreePanel
+from brrt.pictures.tree import TreePanel
 from brrt.worlds.picture import need_matplotlib, new_axes, save_figure
 
 PANELS = ("tree", "cost", "time")
-_CURVE_HEIGHT, _SCALE_HEIGHT = 2.4, 0.65
+_CURVE_HEIGHT, _SCALE_HEIGHT, _LEGEND_HEIGHT = 2.4, 0.65, 0.35
 _LEGEND_COLUMNS, _LEGEND_LINE = 4, 0.8
 _LOWEST, _HIGHEST = 0.3, 2.2
 """Shapes that a map may have, height by width, before it is drawn with empty margins."""
@@ -118,21 +118,21 @@ def tree_panel(part: Any, record: Record, look: Look) -> TreePanel:
     return TreePanel(record, ax, look.rejects)
 
 
-def height_of_tree(record: Record, width: float) -> float:
+def height_of_tree(record: Record, width: float, *, legend: bool = True) -> float:
     """Return the height, in inches, that suits the world in a width."""
-    scale = _SCALE_HEIGHT * bool(record.events.counts.get(Kind.EXPAND))
+    below = 0.0
+    if legend:
+        below = _LEGEND_HEIGHT + _SCALE_HEIGHT * bool(record.events.counts.get(Kind.EXPAND))
     if record.manifest.dim == 3:
-        return 0.95 * width + scale
+        return 0.85 * width + below
     size = record.world.upper - record.world.lower
-    return (width - 0.35) * float(np.clip(size[1] / size[0], _LOWEST, _HIGHEST)) + 0.75 + scale
+    map_height = (width - 0.35) * float(np.clip(size[1] / size[0], _LOWEST, _HIGHEST))
+    return map_height + 0.4 + below
 
 
 def _add_tree(part: Any, record: Record, look: Look) -> None:
     panel = tree_panel(part, record, look)
     panel.show(panel.history.last)
-    for artist in panel.moving:
-        if hasattr(artist, "get_segments"):
-            artist.set_rasterized(len(artist.get_paths()) > MOST_VECTORS)
     marks = panel.legend()
     rows = -(-len(marks) // _LEGEND_COLUMNS)
     columns = -(-len(marks) // rows)

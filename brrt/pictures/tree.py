@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 MOST_VECTORS = 3000
 """Lines or cells up to which a .svg or .pdf keeps each of them; more become an image in it."""
 
+_LINES_IN_PATH = 64
 _GHOSTS = 10
 """Places along a path at which the body is shown."""
 _PARTS = 16
@@ -64,7 +65,7 @@ class TreePanel:
             self._lines[number, "rewired"] = self._collection(
                 rewired, width, "tree", 1.0, "rewired"
             )
-        self._trace = self._collection(style.ROBOT, 0.5, "trace", 0.5, "moves")
+        self._trace = self._collection(style.ROBOT, 0.5, "trace", 0.6, "moves")
         self._ghosts = self._bodies([], style.SMOOTHED, "ghosts") if self._flat else None
         self._paths = {
             name: (self._line(width + 0.8, "white", None), self._line(width, colour, label))
@@ -84,20 +85,22 @@ class TreePanel:
         """Show the run as it stands after an event."""
         history = self.history
         if self._rejects:
-            self._lines["rejects"].set_segments(history.rejects(seq, self._rejects))
+            self._draw_lines(self._lines["rejects"], history.rejects(seq, self._rejects))
         for number in history.trees:
             edges = history.edges(number, seq)
-            self._lines[number].set_segments(edges.ends[~edges.rewired])
-            self._lines[number, "rewired"].set_segments(edges.ends[edges.rewired])
+            self._draw_lines(self._lines[number], edges.ends[~edges.rewired])
+            self._draw_lines(self._lines[number, "rewired"], edges.ends[edges.rewired])
         if history.has_cells:
             self._show_cells(*history.cells(seq))
         trace = history.trace(seq)
         self._trace.set_segments(trace if history.has_cells else [])
         paths = history.paths(seq)
-        for name, found in zip(("raw", "short"), paths, strict=True):
+        best = paths.short or paths.raw
+        # The moves of a robot that learns are its path, and go to and fro over the cells.
+        raw = None if history.learns else paths.raw
+        for name, found in (("raw", raw), ("short", paths.short)):
             for line in self._paths[name]:
                 self._place(line, self._way(found[0]) if found else np.empty((0, 2)))
-        best = paths.short or paths.raw
         if self._ghosts is not None:
             bodies = [] if best is None else list(self._robot.along(best[0], _GHOSTS))
             self._ghosts.set_verts([part for q in bodies for part in self._robot.outline(q)])
@@ -209,6 +212,14 @@ class TreePanel:
         learns = self.history.learns
         return self._cells, "heuristic cost-to-go" if learns else "cost from the start"
 
+    def _draw_lines(self, lines: Any, ends: Floats) -> None:
+        if self._flat:
+            lines._paths = _compound(ends)  # noqa: SLF001 - `set_segments` makes a path of each
+            lines.stale = True
+        else:
+            lines.set_segments(ends)
+        lines.set_rasterized(len(ends) > MOST_VECTORS)
+
     def _show_cells(self, places: Floats, values: Floats) -> None:
         if self._flat:
             half = 0.5 * self._edge
@@ -247,9 +258,18 @@ class TreePanel:
         return " · ".join(words)
 
 
+def _compound(ends: Floats) -> list[Any]:
+    """Return lines, shape (n, 2, 2), as few paths of many lines each: that is drawn much faster."""
+    from matplotlib.path import Path as Strokes  # noqa: PLC0415
+
+    codes = np.tile(np.array([Strokes.MOVETO, Strokes.LINETO], np.uint8), _LINES_IN_PATH)
+    parts = [ends[i : i + _LINES_IN_PATH] for i in range(0, len(ends), _LINES_IN_PATH)]
+    return [Strokes(part.reshape(-1, 2), codes[: 2 * len(part)]) for part in parts]
+
+
 def _holds_something(artist: Any) -> bool:
     if hasattr(artist, "get_segments"):
         segments = getattr(artist, "_segments3d", None)
-        return len(artist.get_segments() if segments is None else segments) > 0
+        return len(artist.get_paths() if segments is None else segments) > 0
     data = artist.get_data_3d() if hasattr(artist, "get_data_3d") else artist.get_data()
     return len(data[0]) > 0
