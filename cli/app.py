@@ -9,6 +9,7 @@ from .console import Code, complain
 from .export import export
 from .lists import planners, robots
 from .plan import plan
+from .plot import plot
 from .replay import replay
 from .verify import verify
 from .worlds import app as worlds
@@ -40,6 +41,7 @@ Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130
 
 app.command()(plan)
 app.command()(replay)
+app.command()(plot)
 app.command()(verify)
 app.command()(export)
 app.command()(planners)

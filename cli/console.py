@@ -42,6 +42,12 @@ def print_json(data: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
 
 
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines on stdout as they are, however wide the terminal is."""
+    for line in lines:
+        out.print(line, markup=False, soft_wrap=True)
+
+
 def print_rows(
     rows: Sequence[Mapping[str, str]], title: str | None = None, *, whole: int = 2
 ) -> None:

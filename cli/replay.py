@@ -1,16 +1,16 @@
 """`brrt replay`: a run's figures and trees, from its recording alone."""
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, note, out, print_json, print_rows, print_summary
+from .console import Code, out, print_json, print_lines, print_rows, print_summary
+from .instant import feed, limits_of, note_if_beyond
 from .saved import Saved
 
 if TYPE_CHECKING:
-    from brrt.events import Events, Instant
+    from brrt.events import Events
     from brrt.recording import Recording
 
 _VERB = "replay them"
@@ -47,6 +47,12 @@ def replay(
     partial: Annotated[
         bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
     ] = False,
+    text: Annotated[
+        bool,
+        typer.Option(
+            "--text", help="Tell the run in plain text without times: the same on every machine."
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object, as plan --json did.")
     ] = False,
@@ -57,30 +63,37 @@ def replay(
 
     brrt replay run.mcap --at 20ms
 
+    brrt replay run.mcap --text
+
     brrt replay run.mcap --check recordings/circles2d-rrt.mcap
 
     brrt replay run.mcap --at-iteration 400 --rrd first400.rrd
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.recording import read  # noqa: PLC0415
+    from brrt.replay.account import Account  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
     check_output(rrd, "--rrd", ".rrd", force=force)
-    limits = _limits(at, at_event, at_iteration)
+    if text and as_json:
+        raise BrrtError("give one of --text and --json")
+    limits = limits_of(at, at_event, at_iteration)
     recording = read(run)
     metrics = Metrics(recording.manifest)
     trees = _Trees()
-    sinks: list[Any] = [metrics] if as_json else [metrics, trees]
-    end = _feed(recording, sinks, limits, partial=partial)
+    told = Account(recording.manifest, recording.robot()) if text else None
+    sinks: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
+    end = feed(Saved(recording, partial=partial, verb=_VERB), sinks, limits)
     if end is not None:
-        _note_if_beyond(limits, *end)
+        note_if_beyond(limits, *end)
     if rrd is not None:
         from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
 
         sink = RerunSink(recording.manifest, recording.world, path=rrd)
         try:
-            _feed(recording, [sink], limits, partial=partial)
+            feed(Saved(recording, partial=partial, verb=_VERB), [sink], limits)
         finally:
             sink.close(whole=recording.result is not None and not limits)
     golden = None if check is None else read(check)
@@ -90,8 +103,11 @@ def replay(
         verdict = {} if check is None else {"check": {"equal": not difference, "first": difference}}
         print_json({**figures, **verdict})
     else:
-        print_summary(figures)
-        trees.show()
+        if told is None:
+            print_summary(figures)
+            trees.show()
+        else:
+            print_lines(told.lines())
         if golden is not None:
             seeds = [each.manifest.scenario.seed for each in (recording, golden)]
             against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"
@@ -99,66 +115,6 @@ def replay(
             out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
     if difference:
         raise typer.Exit(Code.FAILED)
-
-
-def _limits(at: str | None, event: int | None, iteration: int | None) -> dict[str, int]:
-    """Return the instant asked for, as `Events.until` takes it."""
-    from brrt.errors import BrrtError  # noqa: PLC0415
-
-    given = {"t": at, "seq": event, "iteration": iteration}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if len(chosen) > 1:
-        raise BrrtError("give one of --at, --at-event and --at-iteration")
-    if at is not None:
-        return {"t": _nanoseconds(at)}
-    limits = {name: int(value) for name, value in chosen.items()}
-    if any(value < 0 for value in limits.values()):
-        raise BrrtError("--at-event and --at-iteration count from 0")
-    return limits
-
-
-def _nanoseconds(text: str) -> int:
-    from brrt.errors import BrrtError  # noqa: PLC0415
-
-    match = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*(s|ms|us|ns)?", text.strip())
-    if match is None:
-        raise BrrtError(f"--at must be a time like 1.5s, 20ms or 300us, not {text!r}")
-    unit = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}[match[2] or "s"]
-    return int(float(match[1]) * unit)
-
-
-def _feed(
-    recording: "Recording", sinks: list[Any], limits: dict[str, int], *, partial: bool
-) -> "tuple[int, Instant] | None":
-    """Hand the events up to the limits to the sinks.
-
-    Returns:
-        How many events there are and when the last one happened; None if the limits cut them.
-    """
-    from brrt.events import Instant  # noqa: PLC0415
-
-    count, last = 0, Instant(0, 0)
-    for batch in Saved(recording, partial=partial, verb=_VERB):
-        part = batch.until(**limits) if limits else batch
-        for sink in sinks:
-            sink.write(part)
-        if len(part) < len(batch):
-            return None
-        count, last = count + len(batch), batch.last if len(batch) else last
-    return count, last
-
-
-def _note_if_beyond(limits: dict[str, int], count: int, last: "Instant") -> None:
-    """Say so where the instant asked for lies after the end of the recording."""
-    ends = {"seq": count - 1, "t": last.t, "iteration": last.iteration}
-    texts = {
-        "seq": f"with event {count - 1:,}",
-        "t": f"at {last.t / 1e9:.6f} s",
-        "iteration": f"with iteration {last.iteration:,}",
-    }
-    for name, limit in limits.items():
-        if limit > ends[name]:
-            note(f"the recording ends {texts[name]}; this is how it stood then")
 
 
 def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:

@@ -67,6 +67,8 @@ def _panel(
     width, height = (max(1, round(side / pixel)) for side in size)
     height += height % 2
     share = _shares(world, axes, width, height)
+    if world.y_down:
+        share = share[::-1]
     upper, lower = share[-1::-2], share[-2::-2]
     mean = (upper + lower) / 2
     shades = _BLOCKS if blocks else _LETTERS
@@ -80,7 +82,8 @@ def _panel(
         if point is not None:
             at = (point - world.lower)[list(axes)] / size
             column = min(max(int(at[0] * width), 0), width - 1)
-            row = min(max(int((1 - at[1]) * len(lines)), 0), len(lines) - 1)
+            down = at[1] if world.y_down else 1 - at[1]
+            row = min(max(int(down * len(lines)), 0), len(lines) - 1)
             lines[row] = (
                 lines[row][: column + 1]
                 + Text(mark, Style(color=Color.from_rgb(*colour), bold=True))

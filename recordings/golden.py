@@ -44,12 +44,16 @@ def make(name: str, path: Path) -> None:
 
 
 def compare(name: str, fresh: Path) -> str | None:
-    """Say where a fresh recording parts from the golden one, or return None."""
+    """Say where a fresh recording, or its account, parts from the golden one, or return None."""
     kept = FOLDER / f"{name}.mcap"
     if not kept.exists():
         return "is new"
     found = first_difference(read(kept).batches(), read(fresh).batches())
-    return None if found is None else f"{found} (golden against fresh)"
+    if found is not None:
+        return f"{found} (golden against fresh)"
+    account = kept.with_suffix(".txt")
+    told = account.read_text("utf-8") if account.exists() else ""
+    return None if told == read(fresh).text() else f"is not what {account.name} tells"
 
 
 def main() -> int:
@@ -75,6 +79,7 @@ def main() -> int:
             changed += difference is not None
             if difference is not None and options.action == "update":
                 (FOLDER / fresh.name).write_bytes(fresh.read_bytes())
+                (FOLDER / f"{name}.txt").write_text(read(fresh).text(), "utf-8")
     wrong = strays() if options.action == "check" or not options.names else []
     print("\n".join(wrong), end="\n" if wrong else "")
     return 1 if changed or wrong else 0

@@ -143,6 +143,7 @@ BOW = [[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]
     [
         ("{", ": not JSON: "),
         ("[]", ": not an object of GeoJSON with a type"),
+        ({"type": "Circle\n" * 99}, ": unknown type 'Circle\\n"),
         ({"type": 3}, ": not an object of GeoJSON with a type"),
         ({"type": "FeatureCollection"}, ": features must be a list"),
         ({"type": "FeatureCollection", "features": [3]}, ": features[0]: not an object of GeoJSON"),

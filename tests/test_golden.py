@@ -57,6 +57,12 @@ def test_plans_to_the_same_events(path: Path) -> None:
     assert found is None, str(found)
 
 
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+def test_told_as_it_was(path: Path) -> None:
+    """The account of the events is the one that is kept, word for word."""
+    assert brrt.read(path).text() == path.with_suffix(".txt").read_text("utf-8")
+
+
 def test_manifest_makes_them(golden: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each file is what its command writes, and each has one."""
     assert run(golden, monkeypatch, "check") == 0

@@ -28,7 +28,7 @@ from brrt.problem import Problem
 from brrt.robots import Point, Polygon
 from brrt.run import Run
 from brrt.scenario import Scenario
-from brrt.worlds import World, make_world
+from brrt.worlds import World
 
 from . import naive
 from .conftest import Result
@@ -37,7 +37,7 @@ from .naive_lattice import Said, Twin, costs_to_go
 Floats = NDArray[np.float64]
 
 SHARED = Path(__file__).parents[2] / "shared" / "worlds"
-MAPS, GRIDS = SHARED / "ece276b", SHARED / "movingai"
+MAPS = SHARED / "ece276b"
 SOME = settings(max_examples=60, deadline=None)
 ROUNDING = 1e-12
 
@@ -397,27 +397,6 @@ def test_course_maps_on_the_command_line(brrt: Callable[..., Result]) -> None:
         done = brrt("plan", *args, "--planner", "lrta-star", "--json", "--force")
         assert done.code == 0, done.err
         assert done.json["solved"]
-
-
-def scenarios(name: str) -> list[tuple[Floats, Floats, float]]:
-    """Start, goal and least length of some queries of a grid map, hard ones too."""
-    lines = [line.split() for line in (GRIDS / name).read_text().splitlines()[1:]]
-    chosen = lines[:: max(1, len(lines) // 25)] + lines[-5:]
-    numbers = [[float(word) for word in words[-5:]] for words in chosen if words]
-    return [(np.array(n[:2]) + 0.5, np.array(n[2:4]) + 0.5, n[4]) for n in numbers]
-
-
-@pytest.mark.parametrize("path", sorted(GRIDS.glob("*.scen")) or [Path()], ids=lambda p: p.stem)
-def test_movingai_optima(path: Path) -> None:
-    """On real grid maps A* is as short as their authors say."""
-    if not path.name:
-        pytest.skip("no grid maps here")
-    planner = AStar(epsilon=1.0, diagonals=True)
-    name = path.name.removesuffix(".scen").split("-even")[0].removesuffix(".map") + ".map"
-    world = make_world(str(GRIDS / name))
-    for start, goal, length in scenarios(path.name):
-        events = planned(planner, Problem(world, Point(), start, goal))
-        assert events[Kind.PATH]["cost"].tolist() == [pytest.approx(length, abs=1e-3)]
 
 
 PLAIN = """

@@ -1,5 +1,6 @@
 """Maps of ROS's map_server and plain images: which pixels are blocked, and where they lie."""
 
+import time
 import zlib
 from functools import partial
 from pathlib import Path
@@ -156,8 +157,12 @@ def test_strange_fields_are_said(tmp_path: Path) -> None:
     """A field that maps do not have may be a misspelt one."""
     (tmp_path / "image.pgm").write_bytes(PGM)
     path = tmp_path / "m.yaml"
+    path.write_text(YAML + "".join(f'"\\n{i}{"x" * 100}": 1\n' for i in range(50)))
+    notes = load_world(path).notes
+    assert len(notes) == 10
+    assert all(note.isprintable() and len(note) < len(str(path)) + 90 for note in notes)
     path.write_text(YAML + "modus: raw\n")
-    assert load_world(path).notes == (f"{path}:7: modus: no field of a map; left out",)
+    assert load_world(path).notes == (f"{path}:7: 'modus' is no field of a map; left out",)
 
 
 def test_the_image_may_be_named_by_the_user(tmp_path: Path) -> None:
@@ -254,6 +259,23 @@ def test_images_that_lie(name: str, tmp_path: Path) -> None:
     for width, height in ((1000, 1000), (2**31 - 1, 1), (0, 5)):
         path = lying(tmp_path / name, width, height)
         assert refused(partial(load_world, path)).startswith(f"{path}: ")
+
+
+def test_slow_images_are_small(tmp_path: Path) -> None:
+    """A BMP that promises millions of pixels in runs, and has none, takes no time; nor PNM."""
+    runs = lying(tmp_path / "m.bmp", 8000, 8000)
+    data = bytearray(runs.read_bytes())
+    data[30] = 1
+    runs.write_bytes(data)
+    (tmp_path / "text.pgm").write_bytes(b"P2 8000 8000 255\n" + b"0 " * 99)
+    (tmp_path / "odd.pgm").write_bytes(b"P5 8000 8000 100\n" + bytes(99))
+    start = time.perf_counter()
+    for name in ("m.bmp", "text.pgm", "odd.pgm"):
+        error = refused(partial(load_world, tmp_path / name))
+        assert error == (
+            f"{tmp_path / name}: a kind of image that is slow to decode; save it as PNG"
+        )
+    assert time.perf_counter() - start < 1
 
 
 @pytest.mark.parametrize("name", ["m.png", "m.pgm", "m.bmp", "m.jpg"])

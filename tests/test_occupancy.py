@@ -3,7 +3,9 @@
 import base64
 import json
 import zlib
+from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
 from brrt.kernels.jit import kernel
 
 from . import naive
+from .conftest import Result
 
 Floats = NDArray[np.float64]
 
@@ -245,3 +248,17 @@ def test_touching_is_exact_in_thirds() -> None:
     A, B = np.array([[0.0, 0.0]]), np.array([[2 * third, 2 * third]])
     assert hits(world, A, B).all()
     assert not hits(world, A, B * 0.49).any()
+
+
+def test_pictures_stand_as_the_file_does(tmp_path: Path, brrt: Callable[..., Result]) -> None:
+    """A grid map's first line is above in sketches, and stays there when it is saved."""
+    (tmp_path / "m.map").write_text("type octile\nheight 2\nwidth 4\nmap\n@@@@\n....\n")
+    brrt("worlds", "make", "m.map", "--out", "m.json")
+    for name in ("m.map", "m.json"):
+        assert World.load(name).y_down
+        lines = brrt("worlds", "show", name).out.splitlines()
+        assert "█" in lines[1] or "#" in lines[1]
+        frame = next(i for i, line in enumerate(lines[1:], 1) if line[0] in "└+")
+        assert not lines[frame - 1].strip("│| ")
+    with pytest.raises(BrrtError, match="y_down must be true or false"):
+        World.from_json(World.load("m.json").to_json().replace('"y_down": true', '"y_down": 1'))

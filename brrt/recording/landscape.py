@@ -23,8 +23,8 @@ _PIXELS = 640
 
 def log_world(rec: rr.RecordingStream, world: World) -> None:
     """Draw obstacles and bounds."""
-    if world.dim == 2:
-        # Rerun's 2D views have y pointing down; maps have it pointing up.
+    if world.dim == 2 and not world.y_down:
+        # Rerun's 2D views have y pointing down; most maps have it pointing up.
         rec.log("/world", rr.Transform3D(scale=[1, -1, 1]), static=True)
     still = _still_2d(world) if world.dim == 2 else _still_3d(world)
     for entity, archetype in still.items():
@@ -37,7 +37,8 @@ def log_mark(
     """Mark a place, shape (1, d), and write a name below."""
     rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
     # Rerun writes a label across its point; this one stands below.
-    below = place - np.float32(0.012 * world.extent) * np.eye(world.dim, dtype=np.float32)[-1]
+    down = np.eye(world.dim, dtype=np.float32)[-1] * (1 if world.y_down else -1)
+    below = place + np.float32(0.012 * world.extent) * down
     rec.log(f"/world/{name}/label", _label(below, colour, name), static=True)
 
 
@@ -53,7 +54,8 @@ def world_view(world: World, overrides: Mapping[str, Any] | None = None) -> Any:
     margin = 0.04 * (world.upper - world.lower)
     low, high = world.lower - margin, world.upper + margin
     if world.dim == 2:
-        bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[-high[1], -low[1]])
+        y_range = [low[1], high[1]] if world.y_down else [-high[1], -low[1]]
+        bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=y_range)
         return rrb.Spatial2DView(visual_bounds=bounds, **options)
     centre = (world.lower + world.upper) / 2
     reach = float(np.linalg.norm(world.upper - world.lower))

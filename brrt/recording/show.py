@@ -9,9 +9,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from brrt.colours import GOAL, START
+from brrt.errors import RecordingError
 from brrt.recording import landscape, viewer
 from brrt.recording.drain import Drain
 from brrt.worlds.world import World
+
+_GREATEST = 1e30
+"""Within single precision even where a viewer multiplies lengths by sizes of its own."""
 
 
 def show_world(world: World, *, path: Path | None = None, view: bool = False) -> None:
@@ -23,8 +27,14 @@ def show_world(world: World, *, path: Path | None = None, view: bool = False) ->
         view: Open the viewer, or use one that is open.
 
     Raises:
-        RecordingError: The file cannot be written, or there is no viewer.
+        RecordingError: The file cannot be written, there is no viewer, or the world is beyond the
+            numbers that Rerun draws with.
     """
+    if max(np.abs(world.lower).max(), np.abs(world.upper).max()) > _GREATEST:
+        raise RecordingError(
+            f"{world.name}: Rerun draws in single precision, with coordinates up to {_GREATEST:g}; "
+            f"make the world smaller"
+        )
     rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
     name = f"world-{hashlib.sha256(world.to_json().encode()).hexdigest()[:16]}"
     rec: Any = rr.RecordingStream(viewer.APPLICATION, recording_id=name, send_properties=False)

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, unknown
 from brrt.files import replacing
 from brrt.settings import pairs
-from brrt.worlds.convex import GREATEST, convex_polygon, gap
+from brrt.worlds.convex import GREATEST, convex_polygons, gap
 from brrt.worlds.occupancy import Grid
 
 SCHEMA, VERSION, VERSION_WITH_GRID = "brrt.world", 1, 2
 """A brrt that knows no grids must not read a world without its grid."""
 
-_SHAPES = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons", "grid")
+_FIELDS = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons", "grid", "y_down")
 Floats = NDArray[np.float64]
 
 
@@ -58,7 +58,7 @@ def _polygons(values: Any, dim: int) -> tuple[Floats, ...]:
         raise BrrtError("world: polygons must be a list of polygons, each a list of vertices")
     if len(values) and dim != 2:
         raise BrrtError(f"world: polygons stand in the plane, and this world is {dim}D; use boxes")
-    return tuple(convex_polygon(f"world: polygons[{i}]", v) for i, v in enumerate(values))
+    return convex_polygons("world: polygons", list(values))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +77,7 @@ class World:
             vertices make a line segment.
         grid: Occupancy grid, in 2D alone.
         notes: What the user should know of how the world came about; not saved.
+        y_down: Whether pictures have y pointing down, as the file that the world is from has it.
 
     Raises:
         BrrtError: A shape is wrong, a number is not finite, or a minimum exceeds its maximum.
@@ -92,6 +93,7 @@ class World:
     polygons: tuple[Floats, ...] = ()
     grid: Grid | None = None
     notes: tuple[str, ...] = ()
+    y_down: bool = False
 
     @classmethod
     def of_grid(
@@ -101,10 +103,13 @@ class World:
         start: Floats | None = None,
         goal: Floats | None = None,
         notes: tuple[str, ...] = (),
+        *,
+        y_down: bool = False,
     ) -> Self:
         """Make a world of an occupancy grid alone, as large as the grid."""
         lower, upper = grid.corners.min(axis=0), grid.corners.max(axis=0)
-        return cls(name, lower, upper, start=start, goal=goal, grid=grid, notes=notes)
+        ends: dict[str, Any] = {"start": start, "goal": goal}
+        return cls(name, lower, upper, **ends, grid=grid, notes=notes, y_down=y_down)
 
     def __post_init__(self) -> None:
         """Bring the arrays to float64 and check them."""
@@ -130,6 +135,8 @@ class World:
             raise BrrtError("world: a box has a minimum above its maximum")
         if (self.balls[:, dim] < 0).any():
             raise BrrtError("world: a radius is below zero")
+        if not isinstance(self.y_down, bool):
+            raise BrrtError("world: y_down must be true or false")
         if self.grid is not None and dim != 2:
             raise BrrtError(f"world: a grid lies in the plane, and this world is {dim}D")
 
@@ -233,6 +240,8 @@ class World:
             data["polygons"] = [polygon.tolist() for polygon in self.polygons]
         if self.grid is not None:
             data["grid"] = self.grid.as_json()
+        if self.y_down:
+            data["y_down"] = True
         return json.dumps(data)
 
     @classmethod
@@ -257,9 +266,9 @@ class World:
             if name not in data:
                 raise BrrtError(f'not a whole brrt world: the field "{name}" is missing')
         for name in data:
-            if name not in (*_SHAPES, "schema", "version", "name"):
-                raise unknown("field of a world", name, _SHAPES)
-        found = {name: data[name] for name in _SHAPES if name in data}
+            if name not in (*_FIELDS, "schema", "version", "name"):
+                raise unknown("field of a world", name, _FIELDS)
+        found = {name: data[name] for name in _FIELDS if name in data}
         if "grid" in found:
             found["grid"] = Grid.from_json(found["grid"])
         return cls(str(data.get("name", "")), **found)

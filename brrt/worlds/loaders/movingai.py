@@ -55,7 +55,7 @@ class GridMap(Loader):
             BrrtError: The header is wrong, a row is missing or too many, or a character unknown.
         """
         nothing_to_choose(path, query)
-        return World.of_grid(str(path), _grid(_cells(path)))
+        return World.of_grid(str(path), _grid(_cells(path)), y_down=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,8 @@ class Scenarios(Loader):
         notes = [f"{where}: the stated length of the best path in 8 directions is {length:.10g}"]
         if not query:
             notes.insert(0, f"{path}: scenario 0 of {count:,}; name another as {path.name}#12")
-        return World.of_grid(str(path), _grid(cells), start, goal, tuple(notes))
+        ends = (start, goal)
+        return World.of_grid(str(path), _grid(cells), *ends, tuple(notes), y_down=True)
 
     def _map(self, where: str, path: Path, name: str) -> Path:
         if self.map is not None:

@@ -20,6 +20,11 @@ _MOST_BYTES = 1_000_000_000
 _MOST_PIXELS = 2**26
 """Of an image, 8192 x 8192: a grid of them takes 64 MiB."""
 
+_SLOW = {"bmp_rle": 0, "ppm": 2**22, "ppm_plain": 2**22}
+"""Pixels, at most, of what Pillow decodes in Python: PNM in text or of odd depth, BMP in runs.
+
+A BMP that promises runs need not have them, so 200 bytes could take a minute.
+"""
 _CHUNK = 2**20
 
 
@@ -70,6 +75,9 @@ def _decoded(path: Path) -> Pixels:
         width, height = image.size
         if width * height > _MOST_PIXELS:
             raise BrrtError(_too_many(path, f"{width:,} x {height:,}"))
+        codec = image.tile[0].codec_name if image.tile else ""
+        if codec in _SLOW and width * height > _SLOW[codec]:
+            raise BrrtError(f"{path}: a kind of image that is slow to decode; save it as PNG")
         return _grey(image)
 
 

@@ -24,6 +24,7 @@ _MOST_BYTES = 64_000
 """Real ones have 200."""
 
 _NEEDED = ("image", "resolution", "origin", "occupied_thresh", "free_thresh", "negate")
+_MOST_NOTES = 10
 _MODES = ("trinary", "scale", "raw")
 _TRUTH = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
 _OCCUPIED, _UNKNOWN = 100, -1
@@ -83,9 +84,10 @@ class RosMap(Loader):
         return World.of_grid(str(path), grid, notes=tuple(notes))
 
     def _notes(self, path: Path, fields: "Fields", dark: int, cells: int) -> Iterator[str]:
-        for name in fields.nodes:
-            if name not in (*_NEEDED, "mode"):
-                yield f"{fields.where(name[:40])}: no field of a map; left out"
+        strange = [name for name in fields.nodes if name not in (*_NEEDED, "mode")]
+        for name in strange[:_MOST_NOTES]:
+            line = fields.nodes[name].start_mark.line + 1
+            yield f"{path}:{line}: {name[:40]!r} is no field of a map; left out"
         if dark:
             other = "free" if self.unknown == "blocked" else "blocked"
             yield (

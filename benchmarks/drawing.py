@@ -1,0 +1,96 @@
+"""What the picture costs: a Rerun file with everything drawn, against the bare events.
+
+    python benchmarks/drawing.py [--events 200000] [--repeats 5]
+
+The bare file holds the same columns, sent in the same batches by `send_columns`, and nothing else.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+
+from brrt import Events, Memory, Run, Scenario
+from brrt.events import FIELDS
+from brrt.recording.columns import time_columns, to_arrow
+from brrt.recording.rerun import RerunSink
+
+RUNS: dict[str, dict[str, Any]] = {
+    "rrt, 2D": {"world": "enclosure2d", "params": {"step": 0.3, "goal_bias": 0}},
+    "rrt, 3D": {"world": "boxes3d:n=200", "params": {"step": 1.0, "goal_bias": 0}},
+    "rrt-star, 2D": {"world": "squares2d:n=100", "planner": "rrt-star"},
+    "bi-rrt-star, 2D": {"world": "squares2d:n=100", "planner": "bi-rrt-star"},
+}
+"""Runs that last as long as they may."""
+
+
+def recorded(settings: dict[str, Any], events: int) -> tuple[Run, list[Events]]:
+    """Plan until there are so many events; keep them in batches."""
+    run, log = Run(Scenario(**settings, iterations=events, smooth=False)), Memory()
+    count = 0
+    for batch in run.events():
+        log.write(batch)
+        count += len(batch)
+        if count >= events:
+            break
+    return run, log.batches
+
+
+def drawn(run: Run, batches: list[Events], path: Path) -> None:
+    """Write the file as brrt does."""
+    sink = RerunSink(run.manifest, run.problem.world, path=path)
+    for batch in batches:
+        sink.write(batch)
+    sink.close(whole=True)
+
+
+def bare(run: Run, batches: list[Events], path: Path) -> None:
+    """Write the events alone."""
+    rec: Any = rr.RecordingStream("bare", recording_id=str(run.manifest.epoch_ns))
+    rr.set_log_time_enabled(False, recording=rec)
+    rec.save(path)
+    for batch in batches:
+        for kind, table in batch.tables.items():
+            values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
+            columns = rr.DynamicArchetype.columns(kind.label, components=values)
+            rec.send_columns(f"/ev/{kind.label}", time_columns(table), columns)
+        rec.flush()
+    rec.disconnect()
+
+
+def seconds(write: Callable[[Run, list[Events], Path], None], *args: Any) -> float:
+    """How long a file takes."""
+    began = time.perf_counter()
+    write(*args)
+    return time.perf_counter() - began
+
+
+def main() -> None:
+    """Measure side by side and print a line each."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--events", type=int, default=200_000)
+    parser.add_argument("--repeats", type=int, default=5)
+    options = parser.parse_args()
+    print(f"{'':18}{'events':>8}  {'bytes an event':>22}  {'seconds':>22}")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, settings in RUNS.items():
+            run, batches = recorded(settings, options.events)
+            count, paths = sum(map(len, batches)), [Path(folder, f) for f in ("a.rrd", "b.rrd")]
+            best = [float("inf")] * 2
+            for _ in range(options.repeats):
+                for i, write in enumerate((drawn, bare)):
+                    best[i] = min(best[i], seconds(write, run, batches, paths[i]))
+            size = [path.stat().st_size / count for path in paths]
+            texts = [
+                f"{a:.3g} / {b:.3g} = {a / b:.2f}"
+                for a, b in ((size[0], size[1]), (best[0], best[1]))
+            ]
+            print(f"{name:18}{count:>8,}  {texts[0]:>22}  {texts[1]:>22}")
+
+
+if __name__ == "__main__":
+    main()
