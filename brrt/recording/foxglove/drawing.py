@@ -13,18 +13,30 @@ from brrt.events import Events, Kind, Stage, Table
 from brrt.recording import scene
 from brrt.recording.foxglove.lifetimes import BATCH, tell
 from brrt.recording.foxglove.messages import MARKER, Marker, Shape
-from brrt.recording.foxglove.scenery import BODIES, GROUND, LINES, MARKS, PATHS, mark, outline
-from brrt.recording.foxglove.scenery import line as line_of
+from brrt.recording.foxglove.scenery import (
+    BODIES,
+    GROUND,
+    LINES,
+    MARKS,
+    PATHS,
+    mark,
+    outline,
+    segments,
+)
 from brrt.replay.forest import forest
 from brrt.replay.ledger import changes
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
+Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Places = NDArray[np.float32]
 
 _IN_PLANE, _IN_SPACE = 0.84, 0.32
 """Edge of a cell's mark in edges of a cell; small in 3D, where one has to look through."""
+
+_CELL = 0.01
+"""Edge of a cell where a planner from outside does not say, as a part of the world."""
 
 
 class Item(NamedTuple):
@@ -97,7 +109,7 @@ class Drawing:
     def _bodies(self, topic: str, rows: Table) -> Stream:
         for row in rows:
             body = outline(self._robot, row["q"])
-            message = line_of(self._world, body, scene.NEWEST, 1.5, BODIES).message()
+            message = segments(self._world, body, scene.NEWEST, 1.5, BODIES).message()
             yield Item(int(row["t"]), topic, MARKER, message)
 
     def _links(self) -> Stream:
@@ -118,18 +130,35 @@ class Drawing:
             name, colour, radius = scene.path_style(Stage(int(row["stage"])))
             places = self._places(row["waypoints"])
             legs = np.stack([places[:-1], places[1:]], axis=1).reshape(-1, self._world.dim)
-            marker = line_of(self._world, legs, colour, 2 * radius, PATHS)
+            marker = segments(self._world, legs, colour, 2 * radius, PATHS)
             yield Item(int(row["t"]), f"/viz/path/{name}", MARKER, marker.message())
 
     def _cells(self) -> Stream:
         """Show each cell that was expanded by its cost, or by the newest estimate of LRTA*."""
-        expands, raised = self._events[Kind.EXPAND], self._events[Kind.HEURISTIC]
-        if not len(expands) and not len(raised):
+        if not len(self._events[Kind.EXPAND]) and not len(self._events[Kind.HEURISTIC]):
             return iter(())
-        settings = self._manifest.scenario.settings()
+        settings, world = self._manifest.scenario.settings(), self._world
+        t, cell, q, values = self._known(learns="lookahead" in settings)
+        ends = np.array([self._manifest.start, self._manifest.goal])
+        packed = scene.heat(values / (values + (float(self._robot.distance(*ends)) or 1.0)))
+        shifts = np.array([24, 16, 8, 0], np.uint32)
+        colours = ((packed[:, None] >> shifts & 255) / 255).astype(np.float32)
+        edge = float(settings.get("epsilon", 0.0)) or _CELL * world.extent
+        edge *= _IN_PLANE if world.dim == 2 else _IN_SPACE
+        size = (edge, edge, 1e-6 * world.extent if world.dim == 2 else edge)
+        cubes = partial(Marker, Shape.CUBES, scene.TRACE, size, z=GROUND * world.extent)
+        places = self._places(q)
+        return _told("/viz/cells", t, cell, lambda i: cubes(places[i], colours=colours[i]))
+
+    def _known(self, *, learns: bool) -> tuple[Ints, Ints, Floats, Floats]:
+        """Return when something new was known of a cell: time, cell, configuration, value.
+
+        Args:
+            learns: Whether values are estimates of the cost-to-go, at first the distance, which
+                are raised; otherwise they are costs from the start, as first found.
+        """
+        expands, raised = self._events[Kind.EXPAND], self._events[Kind.HEURISTIC]
         goal = np.array(self._manifest.goal)
-        start = np.array(self._manifest.start)
-        learns, edge = "lookahead" in settings, float(settings["epsilon"])
         first = self._robot.distance(expands["q"], goal) if learns else expands["cost"]
         order = np.argsort(np.concatenate([expands["seq"], raised["seq"]]), kind="stable")
         t, cell, q = (
@@ -138,20 +167,7 @@ class Drawing:
         values = np.concatenate([first, raised["h"]])[order]
         kept = order >= len(expands)
         kept[np.unique(cell, return_index=True)[1]] = True
-        values = values[kept]
-        scale = float(self._robot.distance(start, goal)) or 1.0
-        packed = scene.heat(values / (values + scale))
-        shifts = np.array([24, 16, 8, 0], np.uint32)
-        colours = ((packed[:, None] >> shifts & 255) / 255).astype(np.float32)
-        size = (edge * (_IN_PLANE if self._world.dim == 2 else _IN_SPACE),) * 2
-        thick = 1e-6 * self._world.extent if self._world.dim == 2 else size[0]
-        cubes = partial(
-            Marker, Shape.CUBES, scene.TRACE, (*size, thick), z=GROUND * self._world.extent
-        )
-        places = self._places(q[kept])
-        return _told(
-            "/viz/cells", t[kept], cell[kept], lambda i: cubes(places[i], colours=colours[i])
-        )
+        return t[kept], cell[kept], q[kept], values[kept]
 
     def _trace(self) -> Stream:
         """Show the way that the robot has come; each trial begins at the start."""
@@ -175,7 +191,7 @@ class Drawing:
             yield Item(int(row["t"]), "/viz/robot", MARKER, message)
             body = outline(self._robot, row["q"])
             if len(body):
-                marker = line_of(self._world, body, scene.ROBOT, 3.0, BODIES)
+                marker = segments(self._world, body, scene.ROBOT, 3.0, BODIES)
                 yield Item(int(row["t"]), "/viz/robot/body", MARKER, marker.message())
 
     def _of_tree(self, kind: Kind, number: int) -> Table:
@@ -190,7 +206,7 @@ class Drawing:
         points[..., : self._world.dim] = ends
 
         def draw(items: Ints) -> Marker:
-            return line_of(self._world, points[items].reshape(-1, 3), colour, width, LINES)
+            return segments(self._world, points[items].reshape(-1, 3), colour, width, LINES)
 
         return _told(topic, t, keys, draw)
 

@@ -60,7 +60,7 @@ def _camera(world: World) -> dict[str, Any]:
         "targetOrientation": [0.0, 0.0, 0.0, 1.0],
         "fovy": _FIELD_OF_VIEW,
         "near": 1e-3 * distance,
-        "far": 100 * distance,
+        "far": 20 * distance,
     }
 
 

@@ -25,7 +25,7 @@ UNDER, GROUND, LINES, PATHS, BODIES, MARKS = (layer * _LAYER for layer in (-2, -
 """Heights of layers of a 2D world, as parts of the world."""
 
 
-def line(
+def segments(
     world: World, points: NDArray[np.floating], colour: Colour, width: float, layer: float = LINES
 ) -> Marker:
     """Return lines, each between two points, of a width in points of the screen."""
@@ -70,7 +70,7 @@ def _end(
     yield Marker(Shape.TEXT, colour, (0.0, 0.0, size), place=below, text=text, z=z)
     body = outline(robot, q)
     if len(body):
-        yield line(world, body, colour, 3.0, BODIES)
+        yield segments(world, body, colour, 3.0, BODIES)
 
 
 def _bounds(world: World) -> Iterator[Marker]:
@@ -79,7 +79,7 @@ def _bounds(world: World) -> Iterator[Marker]:
     corners = corners.reshape(-1, world.dim)
     apart = (corners[:, None] != corners[None]).sum(axis=2)
     pairs = np.argwhere(np.triu(apart == 1))
-    yield line(world, corners[pairs].reshape(-1, world.dim), OUTLINE, 1.0, GROUND)
+    yield segments(world, corners[pairs].reshape(-1, world.dim), OUTLINE, 1.0, GROUND)
 
 
 def _flat(world: World) -> Iterator[Marker]:
@@ -103,7 +103,7 @@ def _flat(world: World) -> Iterator[Marker]:
     # An edge keeps in sight what is too thin to have an inside.
     edges = [np.stack([hull, np.roll(hull, -1, axis=0)], axis=1) for hull in hulls]
     if edges:
-        yield line(world, np.concatenate(edges).reshape(-1, 2), OBSTACLE, 1.5, GROUND)
+        yield segments(world, np.concatenate(edges).reshape(-1, 2), OBSTACLE, 1.5, GROUND)
 
 
 def _deep(world: World) -> Iterator[Marker]:
