@@ -140,15 +140,14 @@ def _prepare(
     runs: list[Path], limits: dict[str, int], folder: Path, watch: Watch, *, partial: bool
 ) -> "tuple[Path, Cursor | None]":
     """Return an .rrd file of the runs, drawn into the folder where needed, and where to open it."""
-    from brrt.events import Events  # noqa: PLC0415 - keep --help fast
-    from brrt.recording import read  # noqa: PLC0415
+    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
 
     recordings = [read(run) for run in runs]
     logs = []
     for recording, run in zip(recordings, runs, strict=True):
         watch.update(0, f"reading {run.name}", "")
         saved = Saved(recording, partial=partial, verb="show them")
-        logs.append(Events.concat(recording.manifest.dof, saved))
+        logs.append([batch for batch in saved if len(batch)])
     _check_instant(limits, logs)
 
     from brrt.recording.drive import Cursor  # noqa: PLC0415 - costs half a second
@@ -164,25 +163,28 @@ def _prepare(
     return file, cursor
 
 
-def _check_instant(limits: dict[str, int], logs: "list[Events]") -> None:
+def _check_instant(limits: dict[str, int], logs: "list[list[Events]]") -> None:
     """See that at least one of the runs lasts until the instant."""
     from brrt.errors import BrrtError  # noqa: PLC0415
+    from brrt.events import Instant  # noqa: PLC0415
 
     if not limits:
         return
-    late = [beyond(limits, len(log), log.last) for log in logs]
+    late = [
+        beyond(limits, sum(map(len, log)), log[-1].last if log else Instant(0, 0)) for log in logs
+    ]
     if all(late):
         raise BrrtError(f"{late[-1]}; the instant asked for comes later")
 
 
-def _draw(recording: "Recording", log: "Events", file: Path, watch: Watch) -> None:
+def _draw(recording: "Recording", log: "list[Events]", file: Path, watch: Watch) -> None:
     """Draw a recording as `brrt replay --rrd` does."""
     from brrt.recording.rerun import RerunSink  # noqa: PLC0415
 
-    sink, done, total = RerunSink(recording.manifest, recording.world, path=file), 0, len(log)
-    watch.total = total
+    sink, done = RerunSink(recording.manifest, recording.world, path=file), 0
+    watch.total = total = sum(map(len, log))
     try:
-        for batch in recording.batches():
+        for batch in log:
             sink.write(batch)
             done += len(batch)
             watch.update(done, "drawing", f"{done:,} of {total:,} events")
@@ -193,18 +195,24 @@ def _draw(recording: "Recording", log: "Events", file: Path, watch: Watch) -> No
 def _prepare_pair(
     runs: list[Path],
     recordings: "list[Recording]",
-    logs: "list[Events]",
+    logs: "list[list[Events]]",
     folder: Path,
     watch: Watch,
     cursor: "Cursor | None",
 ) -> "tuple[Path, Cursor | None]":
     """Draw two runs; where nothing else is asked for, they open where they part."""
+    from brrt.events import Events  # noqa: PLC0415
     from brrt.recording.drive import Cursor  # noqa: PLC0415
     from brrt.recording.pair import Side, draw_pair  # noqa: PLC0415
 
     watch.update(0, "drawing both runs", "")
     sides = [
-        Side(run.name, recording.manifest, recording.world, log)
+        Side(
+            run.name,
+            recording.manifest,
+            recording.world,
+            Events.concat(recording.manifest.dof, log),
+        )
         for run, recording, log in zip(runs, recordings, logs, strict=True)
     ]
     file = folder / "pair.rrd"

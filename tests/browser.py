@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None)
+TIMEOUT = shutil.which("timeout")
 
 _OPTIONS = (
     "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
@@ -74,6 +75,7 @@ def browser(folder: Path, size: tuple[int, int], seconds: int) -> Iterator[Page]
         seconds: After which it is killed, whatever it does.
     """
     assert CHROMIUM is not None
+    assert TIMEOUT is not None
     theirs, ours = os.pipe(), os.pipe()
 
     def hand_over() -> None:
@@ -84,7 +86,7 @@ def browser(folder: Path, size: tuple[int, int], seconds: int) -> Iterator[Page]
         os.dup2(high[1], 4)
 
     process = subprocess.Popen(
-        ["timeout", "-k", "2", str(seconds), CHROMIUM, *_OPTIONS, f"--user-data-dir={folder}"],  # noqa: S607
+        [TIMEOUT, "-k", "2", str(seconds), CHROMIUM, *_OPTIONS, f"--user-data-dir={folder}"],
         preexec_fn=hand_over,  # noqa: PLW1509 - there is no other way to give it files 3 and 4
         close_fds=False,
         start_new_session=True,

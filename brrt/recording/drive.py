@@ -21,6 +21,8 @@ START_S, LOAD_S, STILL_S = 60.0, 600.0, 60.0
 """Seconds that the viewer gets to start, to load a recording, and to draw it."""
 _PAUSE_S = 0.25
 """Between two looks at what the viewer does."""
+_EMPTY_S = 2.0
+"""After which a recording that has no times yet has none: nothing happened in it."""
 _NO_DRIVER = ("graphics adapter", "render context", "shared libraries", "Vulkan")
 """What it says as it dies for want of a driver."""
 
@@ -110,7 +112,10 @@ def free_port() -> int:
 
 
 def show(run: Path, cursor: Cursor | None) -> None:
-    """Open a recording in the viewer's window, or in the one that is open; it outlives us.
+    """Open a recording in a window of its own; the window outlives us.
+
+    A window that is open may hold a run with another layout, or with another number of degrees of
+    freedom, which Rerun does not take beside it: recordings of one application share both.
 
     The viewer holds on to the file: once this returns, its name may go.
 
@@ -121,9 +126,14 @@ def show(run: Path, cursor: Cursor | None) -> None:
     Raises:
         RecordingError: There is no viewer, or it does not take the recording.
     """
-    program = None if is_taken(viewer.PORT) else Program(f"--port={viewer.PORT}")
-    with _telling("open the recording"):
-        _load(_connect(viewer.PORT, program), run, cursor)
+    port = free_port()
+    program = Program(f"--port={port}", "--hide-welcome-screen")
+    try:
+        with _telling("open the recording"):
+            _load(_connect(port, program), run, cursor)
+    except BaseException:
+        program.stop()
+        raise
 
 
 def screenshot(
@@ -192,45 +202,44 @@ def shoot(client: ViewerClient, run: Path, cursor: Cursor | None, view: str | No
     raise RecordingError(f"{run}: its picture does not come to rest within {STILL_S:.0f} s")
 
 
-def _connect(port: int, program: Program | None) -> ViewerClient:
-    """Wait for a viewer to answer; `program` is it, if it is ours."""
+def _connect(port: int, program: Program) -> ViewerClient:
+    """Wait for a viewer to answer."""
     end = time.monotonic() + START_S
     while True:
-        if program is not None:
-            program.check()
+        program.check()
         try:
             client = ViewerClient.connect(viewer.address(port))
             client.get_state()
         except (OSError, RuntimeError, ValueError) as error:
             if time.monotonic() > end:
-                _give_up(program)
                 reason = str(error).splitlines()[0]
                 raise RecordingError(
-                    f"no Rerun viewer answers at port {port} within {START_S:.0f} s ({reason}); "
-                    "if something else listens there, close it"
+                    f"the Rerun viewer does not answer within {START_S:.0f} s ({reason})"
                 ) from None
             time.sleep(_PAUSE_S)
         else:
             return client
 
 
-def _give_up(program: Program | None) -> None:
-    if program is not None:
-        program.stop()
-
-
 def _load(client: ViewerClient, run: Path, cursor: Cursor | None) -> None:
     """Open a recording, wait for all of it, and go to an instant."""
-    (store,) = client.open(str(run.resolve())).store_ids
-    end = time.monotonic() + LOAD_S
-    while time.monotonic() < end:
+    stores = client.open(str(run.resolve())).store_ids
+    if not stores:
+        said = [entry.message for entry in client.get_logs() if entry.level == "ERROR"]
+        reason = said[-1].splitlines()[0] if said else "it does not say why"
+        raise RecordingError(f"{run}: the Rerun viewer does not take it: {reason}")
+    begin = time.monotonic()
+    while time.monotonic() < begin + LOAD_S:
         state = client.get_state()
-        mine = next((each for each in state.recordings if each.store_id == store), None)
-        if not state.loading and mine is not None and mine.timelines and state.views:
+        mine = next((each for each in state.recordings if each.store_id == stores[0]), None)
+        if mine is not None and state.views and not state.loading:
             if cursor is None or (mine.current_timeline, mine.current_time) == cursor:
                 return
-            time_asked = _time(cursor)
-            client.set_time(cursor.timeline, **time_asked, play_state="paused", recording=store)
+            if mine.timelines:
+                at = _time(cursor)
+                client.set_time(cursor.timeline, **at, play_state="paused", recording=stores[0])
+            elif time.monotonic() > begin + _EMPTY_S:
+                return
         time.sleep(_PAUSE_S)
     raise RecordingError(f"{run}: the Rerun viewer does not show it within {LOAD_S:.0f} s")
 

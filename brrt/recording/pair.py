@@ -17,10 +17,13 @@ from brrt.recording.canvas import moments
 from brrt.recording.columns import time_columns
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
+from brrt.recording.rerun import recording_id
 from brrt.replay.diff import Difference, first_difference
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
+_APPLICATION = f"{viewer.APPLICATION} pair"
+"""A viewer keeps one layout for each application."""
 MARK: Colour = (255, 64, 216)
 """Where two runs part; like nothing else in the picture."""
 LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
@@ -67,7 +70,8 @@ def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
     """
     difference = first_difference([left.events], [right.events])
     rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
-    rec: Any = rr.RecordingStream(viewer.APPLICATION, recording_id="pair", send_properties=False)
+    name = f"{recording_id(left.manifest)}+{recording_id(right.manifest)}"
+    rec: Any = rr.RecordingStream(_APPLICATION, recording_id=name, send_properties=False)
     rr.set_log_time_enabled(False, recording=rec)
     drain = Drain(path)
     try:
