@@ -127,7 +127,9 @@ def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
     for name in ("../maps/other.map", f"{tmp_path}/maps/other.map"):
         (inner / "s.scen").write_text(LIST.replace("maps/grid.map", name))
         error = refused(lambda: load_world(inner / "s.scen"))
-        assert f"s.scen:2: {name[:80]!r} leads out of the file's folder; if it is right, say" in error
+        assert (
+            f"s.scen:2: {name[:80]!r} leads out of the file's folder; if it is right, say" in error
+        )
 
 
 @pytest.mark.parametrize(
