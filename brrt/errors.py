@@ -16,5 +16,6 @@ def unknown(what: str, name: str, known: Iterable[str]) -> BrrtError:
     """Return the error for `name`, which is none of the `known` names of a `what`."""
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
-    hint = f"did you mean {near[0]!r}?" if near else "there is: " + ", ".join(names)
+    there = "there is: " + ", ".join(names) if names else "there is none"
+    hint = f"did you mean {near[0]!r}?" if near else there
     return BrrtError(f"unknown {what} {name!r}; {hint}")

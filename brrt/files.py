@@ -11,6 +11,9 @@ from brrt.errors import BrrtError
 LONGEST_LINE = 10_000
 """Characters of a line of a text format, at most; real ones have a hundred."""
 
+MOST_LINES = 4_000_000
+"""Of a text format; each takes a microsecond or two."""
+
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n?|\n|\Z)")
 
 
@@ -72,7 +75,7 @@ def lines_of(name: str, text: str) -> Iterator[tuple[int, str]]:
         text: Its text; lines may end in any of the usual ways.
 
     Raises:
-        BrrtError: A line is longer than any that means something.
+        BrrtError: A line is longer than any that means something, or there are too many.
     """
     for number, match in enumerate(_LINE.finditer(text), 1):
         start, end = match.span(1)
@@ -80,6 +83,8 @@ def lines_of(name: str, text: str) -> Iterator[tuple[int, str]]:
             raise BrrtError(
                 f"{name}:{number}: {end - start:,} characters; a line has at most {LONGEST_LINE:,}"
             )
+        if number > MOST_LINES:
+            raise BrrtError(f"{name}: more than {MOST_LINES:,} lines; that is too much for a world")
         yield number, match[1]
 
 

@@ -48,7 +48,7 @@ class Problem:
             if len(q) != self.dof:
                 names = ",".join(self.robot.coordinates(self.world))
                 raise BrrtError(
-                    f"{name} {text} has {len(q)} numbers; a configuration here has {self.dof}: "
+                    f"{name} {text}: {len(q)} given; a configuration here has {self.dof} numbers: "
                     f"{names}"
                 )
             if not np.isfinite(q).all():
@@ -59,8 +59,9 @@ class Problem:
                 lower, upper = (
                     ",".join(f"{x:g}" for x in b) for b in (self.space.lower, self.space.upper)
                 )
+                notes = "".join(f" (note: {note})" for note in self.world.notes[:1])
                 raise BrrtError(
-                    f"{name} {text} {why}; choose a free one between {lower} and {upper}"
+                    f"{name} {text} {why}; choose a free one between {lower} and {upper}{notes}"
                 )
             object.__setattr__(self, name, q)
 

@@ -83,8 +83,8 @@ class Scenario:
             if not isinstance(getattr(self, name), bool):
                 raise BrrtError(f"{name} must be true or false, not {getattr(self, name)!r}")
         for name in ("start", "goal"):
-            if isinstance(getattr(self, name), str) and getattr(self, name) != RANDOM:
-                raise _no_configuration(name, getattr(self, name))
+            if isinstance(getattr(self, name), str):
+                object.__setattr__(self, name, _configuration(name, getattr(self, name)))
         if not names_robot_file(self.robot):
             make_robot(self.robot)
         if self.clock not in ("real", "logical"):

@@ -96,6 +96,8 @@ def pairs(owner: str, text: str) -> dict[str, str]:
         name, equals, value = part.partition("=")
         if not equals:
             raise BrrtError(f"{owner}: {part!r} must read name=value")
+        if name.strip() in found:
+            raise BrrtError(f"{owner}: {name.strip()} is given twice; leave one of them away")
         found[name.strip()] = value.strip()
     return found
 

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 import typer
 
 from .console import Code, complain
+from .export import export
 from .lists import planners, robots
 from .plan import plan
+from .plot import plot
 from .replay import replay
 from .verify import verify
 from .view import view
@@ -31,6 +33,8 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt view run.mcap[/bold] shows the tree as it grows
 
+[bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
+
 [bold]brrt planners[/bold] lists what there is to set
 
 Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 interrupted.""",
@@ -38,7 +42,9 @@ Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130
 
 app.command()(plan)
 app.command()(replay)
+app.command()(plot)
 app.command()(verify)
+app.command()(export)
 app.command()(view)
 app.command()(planners)
 app.command()(robots)

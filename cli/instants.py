@@ -1,12 +1,13 @@
-"""Instants of a run on the command line: at a time, after an event or an iteration."""
+"""The instant of a run that a user asks for, and the events up to it."""
 
 import re
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from brrt.events import Instant
+    from brrt.events import Events, Instant
 
 At = Annotated[
     str | None,
@@ -62,6 +63,27 @@ def beyond(limits: dict[str, int], count: int, last: "Instant") -> str | None:
         if limit > ends[name]:
             return f"the recording ends {texts[name]}"
     return None
+
+
+def feed(
+    batches: "Iterable[Events]", sinks: list[Any], limits: dict[str, int]
+) -> "tuple[int, Instant] | None":
+    """Hand the events up to the limits to the sinks.
+
+    Returns:
+        How many events there are and when the last one happened; None if the limits cut them.
+    """
+    from brrt.events import Instant  # noqa: PLC0415
+
+    count, last = 0, Instant(0, 0)
+    for batch in batches:
+        part = batch.until(**limits) if limits else batch
+        for sink in sinks:
+            sink.write(part)
+        if len(part) < len(batch):
+            return None
+        count, last = count + len(batch), batch.last if len(batch) else last
+    return count, last
 
 
 def _nanoseconds(text: str) -> int:

@@ -37,7 +37,9 @@ def print_described(entries: dict[str, dict[str, Any]]) -> None:
     for name, entry in entries.items():
         out.print(f"[bold]{name}[/bold]  {escape(entry['about'])}")
         if entry["params"]:
-            print_rows([{**row, "name": f"  {row['name']}"} for row in entry["params"]])
+            rows = [{**row, "name": f"  {row['name']}"} for row in entry["params"]]
+            units = any(row["unit"] for row in rows)
+            print_rows([{k: v for k, v in row.items() if units or k != "unit"} for row in rows])
         out.print()
 
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
-from .instants import At, AtEvent, AtIteration, beyond, instant
+from .instants import At, AtEvent, AtIteration, beyond, feed, instant
 from .saved import Saved
 
 if TYPE_CHECKING:
-    from brrt.events import Events, Instant
+    from brrt.events import Events
     from brrt.recording import Recording
 
 _VERB = "replay them"
@@ -72,7 +72,7 @@ def replay(
     trees = _Trees()
     told = Account(recording.manifest, recording.robot()) if text else None
     sinks: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
-    end = _feed(recording, sinks, limits, partial=partial)
+    end = feed(Saved(recording, partial=partial, verb=_VERB), sinks, limits)
     if end is not None:
         late = beyond(limits, *end)
         if late is not None:
@@ -82,7 +82,7 @@ def replay(
 
         sink = RerunSink(recording.manifest, recording.world, path=rrd)
         try:
-            _feed(recording, [sink], limits, partial=partial)
+            feed(Saved(recording, partial=partial, verb=_VERB), [sink], limits)
         finally:
             sink.close(whole=recording.result is not None and not limits)
     golden = None if check is None else read(check)
@@ -104,27 +104,6 @@ def replay(
             out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
     if difference:
         raise typer.Exit(Code.FAILED)
-
-
-def _feed(
-    recording: "Recording", sinks: list[Any], limits: dict[str, int], *, partial: bool
-) -> "tuple[int, Instant] | None":
-    """Hand the events up to the limits to the sinks.
-
-    Returns:
-        How many events there are and when the last one happened; None if the limits cut them.
-    """
-    from brrt.events import Instant  # noqa: PLC0415
-
-    count, last = 0, Instant(0, 0)
-    for batch in Saved(recording, partial=partial, verb=_VERB):
-        part = batch.until(**limits) if limits else batch
-        for sink in sinks:
-            sink.write(part)
-        if len(part) < len(batch):
-            return None
-        count, last = count + len(batch), batch.last if len(batch) else last
-    return count, last
 
 
 def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:

@@ -267,7 +267,7 @@ def _counts(figures: dict[str, Any]) -> Iterator[str]:
     if grid is not None:
         turned = f", turned by {grid['yaw']:.4g} rad" if grid["yaw"] else ""
         yield (
-            f"a grid of {grid['rows']:,} x {grid['columns']:,} cells of {grid['resolution']:g}"
+            f"a grid of {grid['columns']:,} x {grid['rows']:,} cells of {grid['resolution']:g}"
             f"{turned}, {grid['blocked']:,} of them blocked"
         )
 

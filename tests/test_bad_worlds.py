@@ -147,6 +147,23 @@ def test_nesting_bombs(tmp_path: Path) -> None:
         assert seconds < 20
 
 
+def test_too_much_of_everything(tmp_path: Path) -> None:
+    """Within 64 MB there is room for millions of lists and lines."""
+    head = '{"schema": "brrt.world", "version": 1, "lower": [0, 0], "upper": [1, 1], '
+    files = {
+        "lists.json": head + '"boxes": [' + "[]," * 20_000_000 + "[]]}",
+        "name.json": head + '"' + "a" * 5_000_000 + '": 1}',
+        "version.json": head.replace("1,", '"' + "v" * 5_000_000 + '",', 1) + '"boxes": []}',
+        "lines.txt": "boundary 0 0 0 9 9 9\n" + "\n" * 5_000_000,
+    }
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    for message, used, seconds in watched(*(tmp_path / name for name in files)):
+        assert len(message) < len(str(tmp_path)) + 450
+        assert used < 700
+        assert seconds < 30
+
+
 def test_collections_in_collections(tmp_path: Path) -> None:
     """What JSON can nest is still too deep for a map."""
     inner: object = {"type": "GeometryCollection", "geometries": []}

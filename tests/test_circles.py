@@ -31,7 +31,7 @@ def test_queries(tmp_path: Path) -> None:
         assert world.goal is not None
         assert world.goal.tolist() == goal
         assert bool(world.notes) == (not spec)
-    assert load_world(path).notes == (f"{path}: query 0 of 2; name one as {path.name}#7",)
+    assert load_world(path).notes == (f"{path}: query 0 of 2; name one as {path}#7",)
     assert make_world(f"{path}:obstacles=other.txt#0").balls.tolist() == [[0, 0, 9]]
     for spec, message in {
         "#3": ": no query 3; there are 2",
@@ -42,11 +42,11 @@ def test_queries(tmp_path: Path) -> None:
     path.write_text("0 start: 1 2\n0 goal: 70 2\n")
     assert refused(lambda: load_world(path)) == (
         f"{path}: the goal 70, 2 lies outside the bounds of the circles; "
-        f"give room: circle_queries.txt:margin=10"
+        f"give room: {path}:margin=10"
     )
     assert make_world(f"{path}:margin=63").goal is not None
     path.rename(tmp_path / "queries_of_no_circles.txt")
-    assert "say where: queries_of_no_circles.txt:obstacles=PATH" in refused(
+    assert "queries_of_no_circles.txt:obstacles=PATH" in refused(
         lambda: load_world(tmp_path / "queries_of_no_circles.txt")
     )
 
@@ -123,3 +123,10 @@ def test_blocks_outside_are_named(tmp_path: Path) -> None:
     path.write_text("boundary 0 0 0 1 1 1\n" + "block 0 0 0 2 1 1\n" * 15)
     assert len(load_world(path).notes) == 11
     assert load_world(path).notes[-1] == f"{path}: 5 more blocks reach outside the boundary"
+
+
+def test_rows_alone_are_circles(tmp_path: Path) -> None:
+    """As one writes them by hand, without a unit or a header."""
+    path = tmp_path / "hand.txt"
+    path.write_text("1 5 5 1\n2 10 -1e1 2.5\n")
+    assert load_world(path).balls.tolist() == [[5, 5, 1], [10, -10, 2.5]]

@@ -154,7 +154,7 @@ BAD = {
         "start nan,1,1 must be finite",
     ),
     "outside": (["--start", "-1,5"], "start -1,5 is outside the bounds"),
-    "dimension": (["--start", "1,2,3"], "start 1,2,3 has 3 numbers; a configuration here has 2"),
+    "dimension": (["--start", "1,2,3"], "start 1,2,3: 3 given; a configuration here has 2"),
     "text": (["--goal", "a,b"], "goal must be numbers"),
     "seed": (["--seed", "-1"], "seed must be at least 0"),
     "iterations": (["--iterations", "0"], "iterations must be at least 1"),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, McapSink, Memory, Run, Scenario, Sink, forest, read
-from brrt.events import Table, table_dtype
+from brrt.events import Reason, Table, table_dtype
 from brrt.recording import fading, pages, paths, scene
 from brrt.recording.rerun import RerunSink
 
@@ -274,8 +274,33 @@ def test_round_trip_of_every_planner(planner: str, tmp_path: Path) -> None:
     for kind, table in a.tables.items():
         for name in table.dtype.names or ():
             assert all(map(np.array_equal, table[name], b[kind][name]))
-    # An empty recording takes 300 kB, most of it the layout.
-    assert files[1].stat().st_size <= 350_000 + 160 * len(b)
+    # An empty recording takes 350 kB, most of it the layout.
+    assert files[1].stat().st_size <= 400_000 + 160 * len(b)
+
+
+@pytest.mark.parametrize("planner", ["rrt", "bi-rrt-star", "a-star"])
+def test_plots_of_effort(planner: str, tmp_path: Path) -> None:
+    """Shares of what became of the extensions are whole; times of iterations add up."""
+    path = tmp_path / "run.rrd"
+    events = record(path, scenario(planner, smooth=False))
+    last = {}
+    for entity, values in rows_of(path, "/series/extensions/", ":scalars").items():
+        last[entity.rsplit("/", 1)[-1]] = max(values)
+    added = len(events[Kind.EDGE]) + len(events[Kind.EXPAND])
+    rejects = events[Kind.REJECT]
+    for name, (seq, (share,)) in last.items():
+        tried = sum(
+            int((events[kind]["seq"] <= seq).sum())
+            for kind in (Kind.EDGE, Kind.EXPAND, Kind.REJECT)
+        )
+        count = added if name == "accepted" else sum(rejects["reason"] == Reason[name.upper()])
+        assert share == pytest.approx(100 * count / tried)
+    paces = rows(path, "/series/pace", ":scalars")
+    steps = events[Kind.SAMPLE] if len(events[Kind.SAMPLE]) else events[Kind.EXPAND]
+    at = np.searchsorted(steps["seq"], [seq for seq, _ in paces])
+    made = np.diff(steps["iteration"][at].astype(int), prepend=0)
+    spent = np.array([value for _, (value,) in paces]) @ made
+    assert spent == pytest.approx(int(steps["t"][-1]) / 1e3)
 
 
 def test_same_picture_from_a_file(tmp_path: Path) -> None:

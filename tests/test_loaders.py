@@ -163,7 +163,7 @@ def test_real_worlds(path: Path | None) -> None:
     if path is None:
         pytest.skip("no real worlds here")
     if path.name == "invalid_image.yaml":
-        remedy = "there is no image 'invalid.png' here; say where: invalid_image.yaml:image=PATH"
+        remedy = f"there is no image 'invalid.png' here; say where: {path}:image=PATH"
         assert refused(lambda: load_world(path)) == f"{path}:1: image: {remedy}"
         assert make_world(f"{path}:image=testmap.png").grid is not None
         return

@@ -76,7 +76,7 @@ def test_map_server(tmp_path: Path) -> None:
     assert grid.cells.tolist() == [[False, False, True], [True, False, True]]
     assert (grid.origin.tolist(), grid.resolution, grid.yaw) == ([1, 2], 0.5, 0.5)
     (note,) = world.notes
-    assert note.startswith(f"{path}: 2 of 6 cells are unknown and count as blocked; m.yaml:unknown")
+    assert note.startswith(f"{path}: 2 of 6 cells are unknown and count as blocked; {path}:unknown")
     free = make_world(f"{path}:unknown=free")
     assert grid_of(free).cells.tolist() == [[False, False, False], [True, False, False]]
     assert "count as free" in free.notes[0]
@@ -157,8 +157,12 @@ def test_strange_fields_are_said(tmp_path: Path) -> None:
     """A field that maps do not have may be a misspelt one."""
     (tmp_path / "image.pgm").write_bytes(PGM)
     path = tmp_path / "m.yaml"
+    path.write_text(YAML + "".join(f'"\\n{i}{"x" * 100}": 1\n' for i in range(50)))
+    notes = load_world(path).notes
+    assert len(notes) == 10
+    assert all(note.isprintable() and len(note) < len(str(path)) + 90 for note in notes)
     path.write_text(YAML + "modus: raw\n")
-    assert load_world(path).notes == (f"{path}:7: modus: no field of a map; left out",)
+    assert load_world(path).notes == (f"{path}:7: 'modus' is no field of a map; left out",)
 
 
 def test_the_image_may_be_named_by_the_user(tmp_path: Path) -> None:

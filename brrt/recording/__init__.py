@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from brrt.errors import RecordingError
+from brrt.recording.container import MAGIC
 from brrt.recording.mcap_reader import CutError, read_mcap
-from brrt.recording.mcap_writer import MAGIC, McapSink
+from brrt.recording.mcap_writer import McapSink
 from brrt.recording.memory import Memory
 from brrt.recording.recording import Recording
 

@@ -13,11 +13,14 @@ from brrt.recording.canvas import Canvas, growing_rows
 from brrt.recording.cells import Cells
 from brrt.recording.fading import Fading
 from brrt.recording.moves import Moves
+from brrt.recording.pace import Pace
 from brrt.recording.paths import Paths
 from brrt.recording.sketch import Sketch
 from brrt.recording.trees import Trees
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
+
+_ACCEPTED = "/series/extensions/accepted"
 
 
 class Drawing:
@@ -39,8 +42,10 @@ class Drawing:
         self._moves = Moves(canvas, manifest)
         self._paths = Paths(canvas)
         self._added, self._rejects = 0, dict.fromkeys(Reason, 0)
+        canvas.plot_style(_ACCEPTED, "accepted", scene.NEWEST)
         for reason, colour in scene.REJECTS.items():
             canvas.plot_style(_rejected(reason), reason.name.lower(), colour)
+        self._pace = Pace(canvas)
 
     def write(self, events: Events) -> None:
         """Draw a batch."""
@@ -48,7 +53,8 @@ class Drawing:
         self._cells.write(events)
         self._fading.rejects(events[Kind.REJECT])
         self._fading.samples(events[Kind.SAMPLE])
-        self._plot_rejects(events)
+        self._plot_extensions(events)
+        self._pace.write(events)
         self._moves.write(events)
         self._paths.write(events)
         for event in events[Kind.PHASE]:
@@ -60,21 +66,25 @@ class Drawing:
         self._trees.close()
         self._cells.close()
 
-    def _plot_rejects(self, events: Events) -> None:
-        """Plot which part of all extensions so far was rejected for a reason."""
+    def _plot_extensions(self, events: Events) -> None:
+        """Plot which part of all extensions so far was accepted, or rejected for a reason."""
         table, added = events[Kind.REJECT], (events[Kind.EDGE], events[Kind.EXPAND])
         before = self._added + sum(self._rejects.values())
-        for reason in Reason:
-            which = np.flatnonzero(table["reason"] == reason)
-            if not len(which):
-                continue
-            have = self._rejects[reason]
-            ends = growing_rows(have, len(which))
-            rows = table[which[ends - 1]]
+
+        def plot(entity: str, have: int, some: Table) -> None:
+            ends = growing_rows(have, len(some))
+            rows = some[ends - 1]
             tried = before + sum(_count_until(rows, each) for each in (table, *added))
-            self._canvas.plot(_rejected(reason), rows, 100 * (have + ends) / tried)
-            self._rejects[reason] = have + len(which)
-        self._added += sum(map(len, added))
+            self._canvas.plot(entity, rows, 100 * (have + ends) / tried)
+
+        for reason in Reason:
+            rejected = table[table["reason"] == reason]
+            if len(rejected):
+                plot(_rejected(reason), self._rejects[reason], rejected)
+                self._rejects[reason] += len(rejected)
+        for some in filter(len, added):
+            plot(_ACCEPTED, self._added, some)
+            self._added += len(some)
 
 
 def _count_until(rows: Table, table: Table) -> np.ndarray:
@@ -83,7 +93,7 @@ def _count_until(rows: Table, table: Table) -> np.ndarray:
 
 
 def _rejected(reason: Reason) -> str:
-    return f"/series/rejected/{reason.name.lower()}"
+    return f"/series/extensions/{reason.name.lower()}"
 
 
 def _phase_text(event: np.void) -> str:

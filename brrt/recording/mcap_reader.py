@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, table_dtype
 from brrt.recording.cdr import MESSAGE, Layout
-from brrt.recording.mcap_writer import MAGIC, RESULT, RUN, WORLD
+from brrt.recording.container import MAGIC
+from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
 from brrt.scenario import Manifest
 from brrt.worlds.world import World

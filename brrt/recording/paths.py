@@ -1,6 +1,5 @@
 """Paths: each that the planner found, each that shortcuts led to, and the body along the last."""
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -97,13 +96,7 @@ class Paths:
         path, robot = event["waypoints"], self._canvas.robot
         if not robot.outline(path[0]):
             return
-        far = np.cumsum([0, *(float(robot.distance(a, b)) for a, b in pairwise(path))])
-        bodies = []
-        for way in np.linspace(0, far[-1], _GHOSTS + 2)[1:-1]:
-            i = min(int(np.searchsorted(far, way, "right")), len(path) - 1) - 1
-            leg = far[i + 1] - far[i]
-            part = (way - far[i]) / leg if leg > 0 else 0.0
-            bodies.append(robot.interpolate(path[i], path[i + 1], part))
+        bodies = list(robot.along(path, _GHOSTS))
         draw_bodies(self._canvas, scene.GHOSTS_ENTITY, moments([event]), [bodies])
 
 

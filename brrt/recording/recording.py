@@ -41,12 +41,61 @@ class Recording:
         """Tell the run in plain text, without times: the same on every machine."""
         return account(self.manifest, self.robot(), self.batches())
 
+    def show(self, *, width: int = 1200, height: int = 700) -> Any:
+        """Show the run in a notebook: the cell's last value, or `display` of it.
+
+        Args:
+            width: Of the viewer, in pixels.
+            height: Of the viewer.
+
+        Returns:
+            Rerun's viewer where rerun-notebook is installed, and otherwise a figure of matplotlib.
+
+        Raises:
+            BrrtError: Neither is installed.
+        """
+        try:
+            import rerun_notebook  # noqa: F401, PLC0415 - an extra that brings much of Jupyter
+        except ImportError:
+            return self.plot().figure
+        from rerun.notebook import Viewer  # noqa: PLC0415 - costs half a second
+
+        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - stands above this file
+
+        viewer = Viewer(width=width, height=height, use_global_recording=False)
+        sink = RerunSink(self.manifest, self.world, embed=viewer)
+        for batch in self.batches():
+            sink.write(batch)
+        sink.close(whole=self.result is not None)
+        return viewer
+
     def metrics(self) -> Metrics:
         """Fold the events into the run's figures."""
         metrics = Metrics(self.manifest)
         for batch in self.batches():
             metrics.write(batch)
         return metrics
+
+    def plot(
+        self, ax: Any = None, *, what: str = "tree", rejects: int = 0, **until: int | None
+    ) -> Any:
+        """Draw the run by matplotlib into axes, new ones by default; return the axes.
+
+        Args:
+            ax: Axes, with projection "3d" for the tree in a world in 3D.
+            what: "tree", or "cost" for that of the best path.
+            rejects: How many of the newest rejected extensions are drawn.
+            until: The instant, as `Events.until` takes it; the end by default.
+
+        Raises:
+            BrrtError: matplotlib is missing, the axes are of no use, or there is no path.
+        """
+        from brrt.pictures.figure import plot  # noqa: PLC0415 - matplotlib is an extra
+        from brrt.pictures.history import Record  # noqa: PLC0415
+
+        events = self.events().until(**until)
+        record = Record(self.manifest.scenario.planner, self.manifest, self.world, events)
+        return plot(record, ax, what=what, rejects=rejects)
 
     def check(self) -> list[Finding]:
         """Hold the run to what its planner promises; return what it breaks."""

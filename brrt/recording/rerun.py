@@ -41,6 +41,7 @@ class RerunSink:
         path: The file; it is overwritten.
         view: Open Rerun's viewer, or use one that is open, and show the events as they come. A
             viewer that is closed meanwhile does not disturb the run.
+        embed: Show them in this viewer of a notebook (`rerun.notebook.Viewer`) instead.
 
     Raises:
         RecordingError: The file cannot be written, or there is no viewer.
@@ -53,6 +54,7 @@ class RerunSink:
         *,
         path: Path | str | None = None,
         view: bool = False,
+        embed: Any = None,
     ) -> None:
         rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
         self._manifest, self._view = manifest, view
@@ -67,7 +69,10 @@ class RerunSink:
             viewer.open_viewer(self._rec)
         self._drain = None if self._path is None else Drain(self._path)
         try:
-            self._connect(blueprint(manifest, world, live=True) if view else self._layout)
+            if embed is None:
+                self._connect(blueprint(manifest, world, live=True) if view else self._layout)
+            else:
+                embed.add_recording(self._rec, self._layout)
             self._write_head(world)
             self._drawing = Drawing(self._rec, manifest, world)
             self._flush()

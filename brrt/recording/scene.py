@@ -170,7 +170,7 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
         columns=rrb.TextLogColumns(timeline_columns=["iteration"], text_log_columns=["body"]),
     )
     run = rrb.TextDocumentView(origin="/run", name="Run")
-    right = rrb.Vertical(*plots(), log, run, row_shares=[3, 3, 3, 4, 5])
+    right = rrb.Vertical(*plots(), log, run, row_shares=[3, 3, 3, 3, 4, 5])
     return rrb.Blueprint(
         rrb.Horizontal(world_view(world), right, column_shares=[5, 2]),
         rrb.TimePanel(
@@ -202,7 +202,8 @@ def plots(*below: str) -> list[rrb.TimeSeriesView]:
         for entity, name in (
             ("nodes", "Nodes"),
             ("cost", "Path cost"),
-            ("rejected", "Rejected extensions, %"),
+            ("extensions", "Extensions, %"),
+            ("pace", "Time an iteration, us"),
         )
     ]
 

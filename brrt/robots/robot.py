@@ -98,6 +98,28 @@ class Robot(Settings):
         """Return the same configuration with its angles in range, shape (dof,)."""
         return q
 
+    def along(self, path: Floats, count: int) -> Floats:
+        """Return configurations on a path, evenly by the metric, between its ends.
+
+        Args:
+            path: Waypoints, shape (m, dof), m at least 1.
+            count: How many.
+
+        Returns:
+            Shape (count, dof).
+        """
+        far = np.cumsum(np.concatenate([[0.0], self.distance(path[:-1], path[1:])]))
+        if far[-1] <= 0:
+            return np.repeat(path[:1], count, axis=0)
+        ways = np.linspace(0, far[-1], count + 2)[1:-1]
+        legs = np.clip(np.searchsorted(far, ways, "right") - 1, 0, len(path) - 2)
+        parts = (ways - far[legs]) / np.maximum(far[legs + 1] - far[legs], np.finfo(float).tiny)
+        on_way = [
+            self.interpolate(path[leg], path[leg + 1], min(part, 1.0))
+            for leg, part in zip(legs.tolist(), parts.tolist(), strict=True)
+        ]
+        return np.array(on_way)
+
     def definition(self) -> dict[str, Any]:
         """Return what a file says of the robot, beyond its kind; `from_definition` reads it."""
         return self.as_dict()

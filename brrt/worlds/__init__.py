@@ -102,6 +102,9 @@ LOADERS: Mapping[str, type[Loader]] = {
 _HEAD = 65_536
 """Bytes that show what a file is."""
 
+_LONGEST = 400
+"""Characters of a message beyond the file's name: what a file holds may be quoted in it."""
+
 
 def make_world(
     spec: str,
@@ -158,9 +161,10 @@ def load_world(path: Path, params: Mapping[str, Any] | None = None, query: str =
         return loader.parse(f"loader {name}", params or {}).load(path, query)
     except BrrtError as error:
         message = str(error)
-        raise BrrtError(
-            message if message.startswith(str(path)) else f"{path}: {message}"
-        ) from None
+        if not message.startswith(str(path)):
+            message = f"{path}: {message}"
+        most = len(str(path)) + _LONGEST
+        raise BrrtError(message if len(message) <= most else message[:most] + " ...") from None
 
 
 def _loader(path: Path) -> tuple[str, type[Loader]]:

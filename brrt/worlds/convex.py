@@ -1,6 +1,7 @@
 """Convex shapes in the plane, as numpy sees them: reading them, and how far apart they are."""
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,39 @@ def convex_polygon(name: str, values: Any) -> Floats:
     return vertices if len(vertices) == 2 else _hull_of_convex(name, vertices)
 
 
+def convex_polygons(name: str, values: Sequence[Any]) -> tuple[Floats, ...]:
+    """Read convex polygons, as `convex_polygon` reads one; most need no second look.
+
+    Args:
+        name: What they are called in messages.
+        values: Vertices of each, shape (k, 2).
+
+    Raises:
+        BrrtError: One is not a convex polygon in the plane.
+    """
+    found: list[Floats | None] = [None] * len(values)
+    alike: dict[int, list[int]] = {}
+    for i, value in enumerate(values):
+        if isinstance(value, list | np.ndarray) and len(value) > 2:
+            alike.setdefault(len(value), []).append(i)
+    for which in alike.values():
+        try:
+            several = np.array([values[i] for i in which], np.float64)
+        except (TypeError, ValueError, OverflowError):
+            continue
+        if several.ndim != 3 or several.shape[2] != 2 or not (np.abs(several) <= GREATEST).all():
+            continue
+        cross, lengths, angles = _turns(several)
+        # Told from flat and from bent by more than rounding: nothing to leave out, and no doubt.
+        sure = (cross > _SLIGHTLY_BENT * lengths).all(axis=1) & (np.abs(angles - 2 * np.pi) < 1)
+        for i, polygon in zip(np.flatnonzero(sure).tolist(), several[sure], strict=True):
+            found[which[i]] = polygon
+    return tuple(
+        convex_polygon(f"{name}[{i}]", values[i]) if polygon is None else polygon
+        for i, polygon in enumerate(found)
+    )
+
+
 def _hull_of_convex(name: str, vertices: Floats) -> Floats:
     """Check that a polygon is convex, up to rounding; return its hull, counter-clockwise."""
     if _cross(vertices - vertices[0], np.roll(vertices, -1, axis=0) - vertices[0]).sum() < 0:
@@ -70,13 +104,21 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _turns(vertices: Floats) -> tuple[Floats, Floats, float]:
-    """At each vertex the cross and the lengths' product of its edges; the angle of all turns."""
-    after = np.roll(vertices, -1, axis=0) - vertices
-    before = np.roll(after, 1, axis=0)
+def _turns(vertices: Floats) -> tuple[Floats, Floats, Floats]:
+    """At each vertex the cross and the lengths' product of its edges; the angle of all turns.
+
+    Args:
+        vertices: Of one polygon or of several with as many vertices each, shape (..., k, 2).
+
+    Returns:
+        Shapes (..., k), (..., k) and (...).
+    """
+    after = np.roll(vertices, -1, axis=-2) - vertices
+    before = np.roll(after, 1, axis=-2)
     cross = _cross(before, after)
-    angle = float(np.arctan2(cross, (before * after).sum(axis=1)).sum())
-    return cross, np.hypot(*before.T) * np.hypot(*after.T), angle
+    angle = np.arctan2(cross, (before * after).sum(axis=-1)).sum(axis=-1)
+    sizes = [np.hypot(along[..., 0], along[..., 1]) for along in (before, after)]
+    return cross, sizes[0] * sizes[1], np.asarray(angle)
 
 
 def axes_of(vertices: Floats) -> Floats:

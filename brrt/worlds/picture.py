@@ -30,20 +30,31 @@ def save_picture(world: World, path: Path) -> None:
     Raises:
         BrrtError: matplotlib is missing, or the file cannot be written.
     """
-    matplotlib = _matplotlib()
+    matplotlib = need_matplotlib()
     width, height = (world.upper - world.lower)[:2] if world.dim == 2 else (1.0, 1.0)
     # Very long worlds get a picture that is long, not one that is a line.
     size = np.maximum(np.array([width, height]) / max(width, height), 0.2) * _INCHES
     figure = matplotlib.figure.Figure(figsize=tuple(size), dpi=_DPI)
     plot(world, figure.add_subplot(projection=None if world.dim == 2 else "3d"))
-    with matplotlib.rc_context({"svg.hashsalt": "brrt"}), replacing(path) as unfinished:
-        figure.savefig(unfinished, bbox_inches="tight", metadata=_undated(path))
+    save_figure(figure, path, bbox_inches="tight")
 
 
-def _undated(path: Path) -> dict[str, Any]:
-    """Leave out the time, so that the same world gives the same file."""
-    names = {".png": "Creation Time", ".svg": "Date", ".pdf": "CreationDate"}
-    return {names[path.suffix]: None} if path.suffix in names else {}
+def save_figure(figure: Any, path: Path, **how: Any) -> None:
+    """Write a figure without the time, so that the same figure gives the same file.
+
+    Args:
+        figure: Of matplotlib.
+        path: The file; it appears under its name when it is whole.
+        how: What `savefig` is to know besides.
+
+    Raises:
+        BrrtError: The file cannot be written.
+    """
+    dates = {".png": "Creation Time", ".svg": "Date", ".pdf": "CreationDate"}
+    undated = {dates[path.suffix]: None} if path.suffix in dates else {}
+    context = need_matplotlib().rc_context({"svg.hashsalt": "brrt"})
+    with context, replacing(path) as unfinished:
+        figure.savefig(unfinished, metadata=undated, **how)
 
 
 def plot(world: World, ax: Any = None) -> Any:
@@ -59,11 +70,9 @@ def plot(world: World, ax: Any = None) -> Any:
     Raises:
         BrrtError: matplotlib is missing, or the axes are of no use for this world.
     """
-    _matplotlib()
+    need_matplotlib()
     if ax is None:
-        import matplotlib.pyplot as plt  # noqa: PLC0415 - it opens windows
-
-        _, ax = plt.subplots(subplot_kw={} if world.dim == 2 else {"projection": "3d"})
+        ax = new_axes("3d" if world.dim == 3 else None)
     if (ax.name == "3d") != (world.dim == 3):
         raise BrrtError(
             f"the world is {world.dim}D; give axes made with subplot_kw={{'projection': '3d'}}"
@@ -77,7 +86,19 @@ def plot(world: World, ax: Any = None) -> Any:
     return ax
 
 
-def _matplotlib() -> Any:
+def new_axes(projection: str | None = None) -> Any:
+    """Return axes of a new figure, which a notebook shows."""
+    import matplotlib.pyplot as plt  # noqa: PLC0415 - it opens windows
+
+    return plt.subplots(subplot_kw={"projection": projection})[1]
+
+
+def need_matplotlib() -> Any:
+    """Import matplotlib.
+
+    Raises:
+        BrrtError: It is missing.
+    """
     try:
         import matplotlib.figure  # noqa: PLC0415 - an extra, and slow to start
     except ImportError:
@@ -87,14 +108,15 @@ def _matplotlib() -> Any:
     return matplotlib
 
 
-def _of(colour: Colour) -> tuple[float, ...]:
+def rgb(colour: Colour) -> tuple[float, ...]:
+    """Return a colour as matplotlib takes it."""
     return tuple(value / 255 for value in colour)
 
 
 def _draw_2d(world: World, ax: Any) -> None:
     from matplotlib import collections as marks  # noqa: PLC0415
 
-    dark = _of(OBSTACLE)
+    dark = rgb(OBSTACLE)
     seam: dict[str, Any] = {"linewidths": _SEAM, "joinstyle": "miter"}
     (x0, y0), (x1, y1) = world.lower, world.upper
     if world.grid is not None:
@@ -119,12 +141,12 @@ def _draw_2d(world: World, ax: Any) -> None:
     for point, colour, name in ((world.start, START, "start"), (world.goal, GOAL, "goal")):
         if point is not None:
             ax.plot(
-                *point, "o", ms=7, color=_of(colour), mec="white", mew=0.8, zorder=5, label=name
+                *point, "o", ms=7, color=rgb(colour), mec="white", mew=0.8, zorder=5, label=name
             )
     ax.set(xlim=(x0, x1), ylim=(y1, y0) if world.y_down else (y0, y1), aspect="equal")
-    ax.tick_params(color=_of(OUTLINE), labelcolor=_of(OUTLINE), labelsize=7, width=0.5, length=2.5)
+    ax.tick_params(color=rgb(OUTLINE), labelcolor=rgb(OUTLINE), labelsize=7, width=0.5, length=2.5)
     for spine in ax.spines.values():
-        spine.set(color=_of(OUTLINE), linewidth=0.6)
+        spine.set(color=rgb(OUTLINE), linewidth=0.6)
 
 
 def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
@@ -135,11 +157,11 @@ def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
 
     if not grid.reaches_all_of(world.lower, world.upper):
         (x, y), size = world.lower, world.upper - world.lower
-        ax.add_patch(Rectangle((x, y), *size, color=_of(OBSTACLE), linewidth=0, zorder=-2))
+        ax.add_patch(Rectangle((x, y), *size, color=rgb(OBSTACLE), linewidth=0, zorder=-2))
     turned = Affine2D().rotate(grid.yaw).translate(*grid.origin)
     width, height = grid.size
     ax.imshow(
-        grid.cells, cmap=ListedColormap([(1, 1, 1), _of(OBSTACLE)]), vmin=0, vmax=1,
+        grid.cells, cmap=ListedColormap([(1, 1, 1), rgb(OBSTACLE)]), vmin=0, vmax=1,
         extent=(0, width, 0, height), origin="lower", interpolation="nearest",
         transform=turned + ax.transData, zorder=-1,
     )  # fmt: skip
@@ -155,28 +177,28 @@ def _draw_3d(world: World, ax: Any) -> None:
         normals += np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 0])
         lengths = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
         light = normals @ (_LIGHT / np.linalg.norm(_LIGHT)) / lengths
-        shade = (0.62 + 0.38 * light)[:, None] * _of(OBSTACLE_3D)
+        shade = (0.62 + 0.38 * light)[:, None] * rgb(OBSTACLE_3D)
         colours = np.concatenate([shade, np.full((len(shade), 1), _SEE_THROUGH)], axis=1)
         edges = np.where(np.arange(len(faces)) < 6 * len(world.boxes), 0.25, 0.0)
         ax.add_collection3d(
             Poly3DCollection(
-                faces, facecolors=colours, edgecolors=_of(OBSTACLE), linewidths=edges, zorder=1
+                faces, facecolors=colours, edgecolors=rgb(OBSTACLE), linewidths=edges, zorder=1
             )
         )
     ax.computed_zorder = False
     for point, colour, name in ((world.start, START, "start"), (world.goal, GOAL, "goal")):
         if point is not None:
             mark = {"marker": "o", "ms": 7, "mec": "white", "mew": 0.8}
-            ax.plot(*point[:, None], color=_of(colour), zorder=5, label=name, ls="", **mark)
+            ax.plot(*point[:, None], color=rgb(colour), zorder=5, label=name, ls="", **mark)
     limits = zip("xyz", world.lower, world.upper, strict=True)
     ax.set(**{f"{axis}lim": (low, high) for axis, low, high in limits})
     ax.set_box_aspect(world.upper - world.lower)
-    ax.tick_params(labelsize=7, labelcolor=_of(OUTLINE), color=_of(OUTLINE))
+    ax.tick_params(labelsize=7, labelcolor=rgb(OUTLINE), color=rgb(OUTLINE))
     sizes = (world.upper - world.lower) / world.extent
     for axis, size in zip((ax.xaxis, ax.yaxis, ax.zaxis), sizes, strict=True):
         axis.set_major_locator(MaxNLocator(max(1, round(5 * size))))
         axis.set_pane_color((1, 1, 1, 0))
-        axis.line.set(color=_of(OUTLINE), linewidth=0.6)
+        axis.line.set(color=rgb(OUTLINE), linewidth=0.6)
         axis._axinfo["grid"].update(linewidth=0.25, color="0.85")  # noqa: SLF001 - no public way
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, unknown
 from brrt.files import replacing
 from brrt.settings import pairs
-from brrt.worlds.convex import GREATEST, convex_polygon, gap
+from brrt.worlds.convex import GREATEST, convex_polygons, gap
 from brrt.worlds.occupancy import Grid
 
 SCHEMA, VERSION, VERSION_WITH_GRID = "brrt.world", 1, 2
@@ -28,12 +28,22 @@ def _numbers_of(name: str, values: Any, what: str) -> Floats:
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise BrrtError(f"world: {name} must be {what}") from None
+        raise BrrtError(f"world: {_first_wrong(name, values)} must be {what}") from None
     if not np.isfinite(array).all():
         raise BrrtError(f"world: {name} must hold finite numbers only")
     if (np.abs(array) > GREATEST).any():
         raise BrrtError(f"world: {name} must hold numbers up to {GREATEST:g} only")
     return array
+
+
+def _first_wrong(name: str, values: Any) -> str:
+    """Name the first row that is not like the first one, or all of them."""
+    if isinstance(values, list) and values and isinstance(values[0], list):
+        for i, row in enumerate(values):
+            numbers = isinstance(row, list) and all(isinstance(x, int | float) for x in row)
+            if not numbers or len(row) != len(values[0]):
+                return f"{name}[{i}] and all others"
+    return name
 
 
 def _point(name: str, values: Any) -> Floats:
@@ -58,7 +68,7 @@ def _polygons(values: Any, dim: int) -> tuple[Floats, ...]:
         raise BrrtError("world: polygons must be a list of polygons, each a list of vertices")
     if len(values) and dim != 2:
         raise BrrtError(f"world: polygons stand in the plane, and this world is {dim}D; use boxes")
-    return tuple(convex_polygon(f"world: polygons[{i}]", v) for i, v in enumerate(values))
+    return convex_polygons("world: polygons", list(values))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +128,8 @@ class World:
                 object.__setattr__(self, name, _point(name, getattr(self, name)))
         dim = len(self.lower)
         if dim not in (2, 3) or len(self.upper) != dim:
-            raise BrrtError(f"world: bounds must have 2 or 3 coordinates, not {dim}")
+            both = f"{dim} in lower and {len(self.upper)} in upper"
+            raise BrrtError(f"world: bounds must have 2 or 3 coordinates, not {both}")
         for name, end in (("start", self.start), ("goal", self.goal)):
             if end is not None and len(end) != dim:
                 raise BrrtError(f"world: {name} must be {dim} numbers, not {len(end)}")
@@ -130,11 +141,17 @@ class World:
     def _check_ranges(self, dim: int) -> None:
         """See that what has two sides has them in order."""
         if not (self.lower < self.upper).all():
-            raise BrrtError("world: each upper bound must be above its lower bound")
-        if (self.boxes[:, :dim] > self.boxes[:, dim:]).any():
-            raise BrrtError("world: a box has a minimum above its maximum")
+            bounds = f"{_numbers(self.lower)} to {_numbers(self.upper)}"
+            raise BrrtError(f"world: each upper bound must be above its lower bound, not {bounds}")
+        crossed = (self.boxes[:, :dim] > self.boxes[:, dim:]).any(axis=1)
+        if crossed.any():
+            i = int(crossed.argmax())
+            row = _numbers(self.boxes[i])
+            raise BrrtError(f"world: boxes[{i}] has a minimum above its maximum: {row}")
         if (self.balls[:, dim] < 0).any():
-            raise BrrtError("world: a radius is below zero")
+            i = int((self.balls[:, dim] < 0).argmax())
+            radius = self.balls[i, dim]
+            raise BrrtError(f"world: balls[{i}]: the radius must not be below zero: {radius:g}")
         if not isinstance(self.y_down, bool):
             raise BrrtError("world: y_down must be true or false")
         if self.grid is not None and dim != 2:
@@ -328,6 +345,10 @@ class World:
         Raises:
             BrrtError: It cannot be written.
         """
+        if Path(path).suffix != ".json":
+            raise BrrtError(
+                f"{path}: the name must end in .json, or brrt takes it for another file"
+            )
         with replacing(Path(path)) as unfinished:
             unfinished.write_text(self.to_json() + "\n")
 

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.files import read_text
 from brrt.settings import param
 from brrt.worlds.convex import GREATEST
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
+from brrt.worlds.loaders.loader import Loader, json_text, nothing_to_choose
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -22,6 +21,7 @@ Floats = NDArray[np.float64]
 _MEMBERS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 _KINDS = ("FeatureCollection", "Feature", "GeometryCollection", "MultiPolygon", "Polygon")
 _BEGINS = re.compile(rf'"type"\s*:\s*"(?:{"|".join((*_KINDS, "Point"))})"'.encode())
+_LEFT_OUT = ("Point", "MultiPoint", "LineString", "MultiLineString")
 _ENDS = ("start", "goal")
 _DEEPEST = 20
 """Collections within collections, at most; the standard advises against any."""
@@ -75,7 +75,7 @@ class GeoJson(Loader):
         """
         nothing_to_choose(path, query)
         try:
-            data = json.loads(read_text(path, "a world", MOST_BYTES))
+            data = json.loads(json_text(path))
         except (ValueError, RecursionError) as error:
             raise BrrtError(f"{path}: not JSON: {str(error)[:120]}") from None
         found = _Found()
@@ -113,7 +113,7 @@ class GeoJson(Loader):
         if margin is None:
             margin = 0.0 if box is not None else float((upper - lower).max()) / 10
         if not (lower - margin < upper + margin).all():
-            raise BrrtError(f"{path}: its bounds span no area; give room: {path.name}:margin=1")
+            raise BrrtError(f"{path}: its bounds span no area; give room: {path}:margin=1")
         return lower - margin, upper + margin
 
 
@@ -136,8 +136,10 @@ def _collect(found: _Found, path: str, where: str, data: Any, depth: int) -> Non
         for i, rings in enumerate(_list(f"{path}: {where}coordinates", many)):
             part = f"polygon {i}: " if kind == "MultiPolygon" else ""
             _polygon(found, path, f"{path}: {where}{part}", rings)
+    elif kind in _LEFT_OUT:
+        found.others[kind] = found.others.get(kind, 0) + 1
     else:
-        found.others[kind[:40]] = found.others.get(kind[:40], 0) + 1
+        raise BrrtError(f"{path}: {where}unknown type {kind[:40]!r} of GeoJSON")
 
 
 def _feature(found: _Found, path: str, where: str, data: dict[str, Any], depth: int) -> None:

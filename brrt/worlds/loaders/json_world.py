@@ -4,8 +4,7 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from brrt.files import read_text
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
+from brrt.worlds.loaders.loader import Loader, json_text, nothing_to_choose
 from brrt.worlds.world import World
 
 
@@ -18,7 +17,9 @@ class JsonWorld(Loader):
     @classmethod
     def recognises(cls, head: bytes) -> bool:
         """Whether the schema stands near the beginning, where it is written."""
-        return re.search(rb'"schema"\s*:\s*"brrt\.world"', head) is not None
+        return head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{") and bool(
+            re.search(rb'"schema"\s*:\s*"brrt\.world"', head)
+        )
 
     def load(self, path: Path, query: str) -> World:
         """Read a world.
@@ -27,4 +28,4 @@ class JsonWorld(Loader):
             BrrtError: The text is not such a world.
         """
         nothing_to_choose(path, query)
-        return replace(World.from_json(read_text(path, "a world", MOST_BYTES)), name=str(path))
+        return replace(World.from_json(json_text(path)), name=str(path))

@@ -7,13 +7,14 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import ClassVar, NamedTuple
 
 from brrt.errors import BrrtError
-from brrt.files import is_file, is_there
+from brrt.files import is_file, is_there, read_text
 from brrt.settings import Settings
 from brrt.worlds.convex import GREATEST
 from brrt.worlds.world import World
 
 MOST_BYTES = 64_000_000
 """Bytes of a text file, at most."""
+_MOST_LISTS = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,18 @@ def _is_cut(spec: str, i: int) -> bool:
     """Whether parameters or a query could begin at a `:` or `#`; not at that of `C:`."""
     name, equals, _ = spec[i + 1 :].partition("=")
     return spec[i] == "#" or bool(equals and name.strip().isidentifier())
+
+
+def json_text(path: Path) -> str:
+    """Read a file of JSON that will not take gigabytes once it is parsed.
+
+    Raises:
+        BrrtError: It cannot be read, is too long, or holds millions of lists.
+    """
+    text = read_text(path, "a world", MOST_BYTES)
+    if text.count("[") + text.count("{") > _MOST_LISTS:
+        raise BrrtError(f"{path}: more than {_MOST_LISTS:,} lists; that is too much for a world")
+    return text
 
 
 def nothing_to_choose(path: Path, query: str) -> None:

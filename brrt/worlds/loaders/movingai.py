@@ -100,7 +100,7 @@ class Scenarios(Loader):
         (length,) = finite(where, words[8:])
         notes = [f"{where}: the stated length of the best path in 8 directions is {length:.10g}"]
         if not query:
-            notes.insert(0, f"{path}: scenario 0 of {count:,}; name another as {path.name}#12")
+            notes.insert(0, f"{path}: scenario 0 of {count:,}; name another as {path}#12")
         ends = (start, goal)
         return World.of_grid(str(path), _grid(cells), *ends, tuple(notes), y_down=True)
 
@@ -110,7 +110,7 @@ class Scenarios(Loader):
         bare = path.parent / PurePosixPath(name.replace("\\", "/")).name
         if is_file(bare):
             return bare
-        remedy = f"{path.name}:map=PATH"
+        remedy = f"{path}:map=PATH"
         named = named_inside(where, path, name, remedy)
         if not is_file(named):
             raise BrrtError(

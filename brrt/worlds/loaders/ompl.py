@@ -22,7 +22,9 @@ from brrt.worlds.loaders.loader import (
 )
 from brrt.worlds.world import World
 
-_CIRCLES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+(?:units:|x\s+y\s+r\b)")
+_ROW = rb"\d+(?:[ \t]++[-+]?[0-9.][-+.0-9eE]*+){3}\s*?(?:\n|\Z)"
+_CIRCLES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+(?:units:|x\s+y\s+r\b|" + _ROW + rb")")
+"""The unit, the header, or a row: files by hand have rows alone."""
 _QUERIES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+\d+\s++(?:start|goal):")
 _MOST = 10**9
 
@@ -43,7 +45,7 @@ class Circles(Loader):
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether it begins with `units:`, with the header `x y r`, or with a query."""
+        """Whether it begins with `units:`, the header `x y r`, a row of four, or with a query."""
         return bool(_CIRCLES.match(head) or _QUERIES.match(head))
 
     def load(self, path: Path, query: str) -> World:
@@ -57,7 +59,7 @@ class Circles(Loader):
             nothing_to_choose(path, query)
             return self._world(path, _circles(str(path), text), None, ())
         number, ends, count = _query(path, text, query)
-        notes = [] if query else [f"{path}: query {number} of {count:,}; name one as {path.name}#7"]
+        notes = [] if query else [f"{path}: query {number} of {count:,}; name one as {path}#7"]
         source = self._obstacles(path)
         circles = _circles(str(source), read_text(source, "a world", MOST_BYTES))
         return self._world(path, circles, ends, tuple(notes))
@@ -72,13 +74,13 @@ class Circles(Loader):
         lower = (circles[:, :2] - circles[:, 2:]).min(axis=0) - self.margin
         upper = (circles[:, :2] + circles[:, 2:]).max(axis=0) + self.margin
         if not (lower < upper).all():
-            raise BrrtError(f"{path}: the circles span no area; give room: {path.name}:margin=1")
+            raise BrrtError(f"{path}: the circles span no area; give room: {path}:margin=1")
         start, goal = (None, None) if ends is None else ends
         for what, end in (("start", start), ("goal", goal)):
             if end is not None and not ((lower <= end) & (end <= upper)).all():
                 raise BrrtError(
                     f"{path}: the {what} {end[0]:g}, {end[1]:g} lies outside the bounds of the "
-                    f"circles; give room: {path.name}:margin=10"
+                    f"circles; give room: {path}:margin=10"
                 )
         return World(str(path), lower, upper, balls=circles, start=start, goal=goal, notes=notes)
 
@@ -87,9 +89,10 @@ class Circles(Loader):
             return named_by_user(path, self.obstacles)
         beside = path.with_name(path.name.replace("queries", "obstacles"))
         if beside == path or not is_file(beside):
+            missing = "" if beside == path else f" in {beside.name} beside them"
             raise BrrtError(
-                f"{path}: these are queries, and their circles are not in {beside.name} beside "
-                f"them; say where: {path.name}:obstacles=PATH"
+                f"{path}: these are queries, and their circles are not there{missing}; "
+                f"say where: {path}:obstacles=PATH"
             )
         return beside
 

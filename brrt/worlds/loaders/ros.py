@@ -24,9 +24,11 @@ _MOST_BYTES = 64_000
 """Real ones have 200."""
 
 _NEEDED = ("image", "resolution", "origin", "occupied_thresh", "free_thresh", "negate")
+_MOST_NOTES = 10
 _MODES = ("trinary", "scale", "raw")
 _TRUTH = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
 _OCCUPIED, _UNKNOWN = 100, -1
+_HALF = 50.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class RosMap(Loader):
 
     unknown: Literal["blocked", "free"] = param("blocked", "how unknown cells count")
     occupied: float = param(
-        50.0, "cells from here on are blocked", above=0, high=100, unit="% occupied"
+        _HALF, "scale and raw: cells from here on are blocked", above=0, high=100, unit="%"
     )
     image: str | None = param(None, "the image, where it is not the one that the yaml names")
 
@@ -75,6 +77,8 @@ class RosMap(Loader):
         mode, negate, (occupied, free) = _mode(fields), _negate(fields), _thresholds(fields)
         values = occupancy(self._pixels(path, fields), mode, occupied, free, negate=negate)
         dark = values == _UNKNOWN
+        if mode == "trinary" and self.occupied != _HALF:
+            raise BrrtError(f"{path}: occupied counts in the modes scale and raw; this is trinary")
         blocked = values >= self.occupied
         if self.unknown == "blocked":
             blocked |= dark
@@ -83,21 +87,22 @@ class RosMap(Loader):
         return World.of_grid(str(path), grid, notes=tuple(notes))
 
     def _notes(self, path: Path, fields: "Fields", dark: int, cells: int) -> Iterator[str]:
-        for name in fields.nodes:
-            if name not in (*_NEEDED, "mode"):
-                yield f"{fields.where(name[:40])}: no field of a map; left out"
+        strange = [name for name in fields.nodes if name not in (*_NEEDED, "mode")]
+        for name in strange[:_MOST_NOTES]:
+            line = fields.nodes[name].start_mark.line + 1
+            yield f"{path}:{line}: {name[:40]!r} is no field of a map; left out"
         if dark:
             other = "free" if self.unknown == "blocked" else "blocked"
             yield (
                 f"{path}: {dark:,} of {cells:,} cells are unknown and count as {self.unknown}; "
-                f"{path.name}:unknown={other} makes them {other}"
+                f"{path}:unknown={other} makes them {other}"
             )
 
     def _pixels(self, path: Path, fields: "Fields") -> Pixels:
         if self.image is not None:
             return read_pixels(named_by_user(path, self.image))
         where, name = fields.where("image"), fields.text("image")
-        remedy = f"{path.name}:image=PATH"
+        remedy = f"{path}:image=PATH"
         image = named_inside(where, path, name, remedy)
         if not name or not is_file(image):
             raise BrrtError(f"{where}: there is no image {name[:80]!r} here; say where: {remedy}")

@@ -1,0 +1,62 @@
+"""`brrt export`: a run for other viewers."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .console import Watch, out
+from .saved import Saved
+
+
+def export(
+    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
+    foxglove: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write an .mcap whose 3D panel shows any instant, for Foxglove and Lichtblick.",
+            metavar="OUT",
+        ),
+    ] = None,
+    layout: Annotated[
+        Path | None,
+        typer.Option(help="Write a layout to import there, a .json file.", metavar="LAYOUT"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+    ] = False,
+) -> None:
+    """Write a run in a form that other viewers show.
+
+    brrt export run.mcap --foxglove viz.mcap --layout layout.json
+    """
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.events import Events  # noqa: PLC0415
+    from brrt.recording import read  # noqa: PLC0415
+
+    from .outputs import check_output  # noqa: PLC0415
+
+    if foxglove is None:
+        raise BrrtError("nothing to export to; name a file with --foxglove OUT.mcap")
+    check_output(foxglove, "--foxglove", ".mcap", force=force)
+    check_output(layout, "--layout", ".json", force=force)
+    if foxglove.exists() and run.exists() and foxglove.samefile(run):
+        raise BrrtError(f"--foxglove {foxglove}: is the recording; choose another name")
+    recording = read(run)
+    with Watch(None, "reading the recording").running() as watch:
+        batches = Saved(recording, partial=partial, verb="export them")
+        events = Events.concat(recording.manifest.dof, batches)
+        from brrt.recording import foxglove as viewers  # noqa: PLC0415 - costs half a second
+
+        watch.total = 1.0
+        count = viewers.export(
+            recording,
+            foxglove,
+            layout_path=layout,
+            events=events,
+            progress=lambda part: watch.update(part, "writing", f"{part:.0%}"),
+        )
+    imported = "" if layout is None else f"; import {layout} as a layout first"
+    text = f"{foxglove}: {count:,} messages for Foxglove or Lichtblick{imported}"
+    out.print(text, markup=False, soft_wrap=True)
