@@ -214,9 +214,9 @@ def _layout(left: Side, right: Side) -> rrb.Blueprint:
         ),
     )
     runs = [rrb.TextDocumentView(origin=f"/{each}/run", name=each) for each in "AB"]
-    below = rrb.Horizontal(
-        *scene.plots("/A", "/B"), log, rrb.Tabs(*runs), column_shares=[3, 3, 3, 5, 4]
-    )
+    plots = scene.plots("/A", "/B")
+    shares = [3] * len(plots) + [5, 4]
+    below = rrb.Horizontal(*plots, log, rrb.Tabs(*runs), column_shares=shares)
     driven = any(side.manifest.scenario.execute for side in (left, right))
     return rrb.Blueprint(
         rrb.Vertical(rrb.Horizontal(*worlds), below, row_shares=[7, 3]),
