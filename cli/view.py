@@ -245,7 +245,9 @@ def _serve(file: Path, runs: list[Path], port: int | None) -> None:
 @contextmanager
 def _ending_in_order() -> Iterator[None]:
     """End by a signal as by Ctrl-C: nothing that we started or wrote for a while outlives us."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+        numbers.append(signal.SIGHUP)
     before = [signal.signal(number, _interrupt) for number in numbers]
     try:
         yield

@@ -282,6 +282,11 @@ def served(folder: Path, *args: object) -> Iterator[tuple[subprocess.Popen[str],
             yield process, line.split(" at ")[1].strip()
         finally:
             process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(30)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
 
 
 def ports_of(process: Any) -> dict[int, str]:
