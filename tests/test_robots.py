@@ -495,7 +495,7 @@ BAD_USE = {
     "3D": (("--robot", "polygon", "--world", "boxes3d"), "moves in the plane, but world boxes3d"),
     "numbers": (
         ("--robot", "polygon", "--start", "5,5"),
-        "start 5,5 has 2 numbers; a configuration here has 3: x,y,theta",
+        "start 5,5: 2 given; a configuration here has 3 numbers: x,y,theta",
     ),
     "no start": (("--robot", "chain"), "robot chain; give --start theta1,theta2,theta3"),
     "limits": (

@@ -21,6 +21,8 @@ START_S, LOAD_S, STILL_S = 60.0, 600.0, 60.0
 """Seconds that the viewer gets to start, to load a recording, and to draw it."""
 _PAUSE_S = 0.25
 """Between two looks at what the viewer does."""
+_DYING_S = 3.0
+"""Within which a viewer that does not answer any more may turn out to have ended."""
 _EMPTY_S = 2.0
 """After which a recording that has no times yet has none: nothing happened in it."""
 _NO_DRIVER = ("graphics adapter", "render context", "shared libraries", "Vulkan")
@@ -129,7 +131,7 @@ def show(run: Path, cursor: Cursor | None) -> None:
     port = free_port()
     program = Program(f"--port={port}", "--hide-welcome-screen")
     try:
-        with _telling("open the recording"):
+        with _telling("open the recording", program):
             _load(_connect(port, program), run, cursor)
     except BaseException:
         program.stop()
@@ -170,7 +172,7 @@ def headless(size: tuple[int, int]) -> Iterator[ViewerClient]:
         "--headless", f"--port={port}", f"--window-size={width}x{height}", "--hide-welcome-screen"
     )
     try:
-        with _telling("picture the recording"):
+        with _telling("picture the recording", program):
             yield _connect(port, program)
     finally:
         program.stop()
@@ -251,10 +253,14 @@ def _time(cursor: Cursor) -> dict[str, Any]:
 
 
 @contextmanager
-def _telling(what: str) -> Iterator[None]:
-    """Turn what the viewer's client raises into one line."""
+def _telling(what: str, program: Program) -> Iterator[None]:
+    """Turn what the viewer's client raises into one line; a viewer that dies says why itself."""
     try:
         yield
     except (OSError, RuntimeError) as error:
+        end = time.monotonic() + _DYING_S
+        while time.monotonic() < end:
+            program.check()
+            time.sleep(_PAUSE_S)
         reason = (str(error).strip() or repr(error)).splitlines()[0]
         raise RecordingError(f"the Rerun viewer cannot {what}: {reason}") from None
