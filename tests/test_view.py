@@ -159,6 +159,7 @@ def test_screenshot(brrt: Callable[..., Result], tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("viewer")
+@pytest.mark.usefixtures("viewer")  # elsewhere libraries may be missing too
 def test_no_driver(brrt: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing can draw, one line says what to install."""
     for name in ("VK_ICD_FILENAMES", "VK_DRIVER_FILES"):
