@@ -18,32 +18,35 @@ from PIL import Image
 SIZE, WIDTH = (1600, 900), 1024
 """Of the viewer, and of the pictures in pixels: a few hundred kB would be too much to load."""
 
-README: dict[str, tuple[str, int]] = {
+STAR = "--planner rrt-star --seed 3 --iterations 600"
+README: dict[str, tuple[tuple[str, ...], int | None]] = {
     "rrt2d.png": (
-        "--world squares2d:n=120,seed=4,min_side=3,max_side=10 --seed 7 --param step=2.5",
+        ("--world squares2d:n=120,seed=4,min_side=3,max_side=10 --seed 7 --param step=2.5",),
         648,
     ),
     "bi_rrt_star.png": (
-        "--planner bi-rrt-star --world squares2d:n=60,seed=3 --seed 1 --iterations 5000",
+        ("--planner bi-rrt-star --world squares2d:n=60,seed=3 --seed 1 --iterations 5000",),
         600,
     ),
+    "pair.png": ((STAR, f"{STAR} --param informed=true"), None),
 }
-"""How each run is made, and the iteration to show."""
+"""How each run is made, one or two, and the iteration to show; None is where the two part."""
 
 
 def shoot_readme(folder: Path) -> None:
     """Make the README's pictures."""
     brrt = str(Path(sys.executable).with_name("brrt"))
     size = "x".join(map(str, SIZE))
-    with tempfile.TemporaryDirectory() as runs:
+    with tempfile.TemporaryDirectory() as made:
         for name, (options, iteration) in README.items():
-            run = Path(runs, name).with_suffix(".mcap")
-            command = [brrt, "plan", *options.split(), "--out", str(run)]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            runs = [str(Path(made, f"{letter}.mcap")) for letter, _ in zip("AB", options)]  # noqa: B905
+            for run, each in zip(runs, options, strict=True):
+                command = [brrt, "plan", *each.split(), "--out", run, "--force"]
+                subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             picture = folder / name
-            shown = ["--at-iteration", str(iteration), "--size", size]
-            command = [brrt, "view", str(run), *shown, "--screenshot", str(picture), "--force"]
-            subprocess.run(command, check=True)
+            shown = ["--at-iteration", str(iteration)] if iteration is not None else []
+            command = [brrt, "view", *runs, *shown, "--size", size, "--screenshot", str(picture)]
+            subprocess.run([*command, "--force"], check=True)
             shrink(picture)
 
 
