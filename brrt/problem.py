@@ -59,7 +59,9 @@ class Problem:
                 lower, upper = (
                     ",".join(f"{x:g}" for x in b) for b in (self.space.lower, self.space.upper)
                 )
-                notes = "".join(f" (note: {note})" for note in self.world.notes[:1])
+                # What of a map is unknown, and how it counts, is why many a start is not free.
+                known = self.world.notes[:1] if self.world.grid is not None else ()
+                notes = "".join(f" (note: {note})" for note in known)
                 raise BrrtError(
                     f"{name} {text} {why}; choose a free one between {lower} and {upper}{notes}"
                 )
