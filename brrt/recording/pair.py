@@ -16,9 +16,9 @@ from brrt.events import Events, Kind
 from brrt.recording import landscape, scene, viewer
 from brrt.recording.canvas import moments
 from brrt.recording.columns import time_columns
-from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
 from brrt.recording.rerun import recording_id
+from brrt.recording.stream import filled, new_stream
 from brrt.replay.diff import Difference, first_difference
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -71,16 +71,9 @@ def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
         RecordingError: The file cannot be written.
     """
     difference = first_difference([left.events], [right.events])
-    rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
     name = f"{recording_id(left.manifest)}+{recording_id(right.manifest)}"
-    rec: Any = rr.RecordingStream(_APPLICATION, recording_id=name, send_properties=False)
-    rr.set_log_time_enabled(False, recording=rec)
-    drain = Drain(path)
-    try:
-        try:
-            rec.set_sinks(rr.FileSink(drain.inlet), default_blueprint=_layout(left, right))
-        finally:
-            drain.leave()
+    rec = new_stream(name, _APPLICATION)
+    with filled(rec, _layout(left, right), path, view=False):
         for letter, side, colour in zip("AB", (left, right), LINES, strict=True):
             branch: Any = _Branch(rec, f"/{letter}", letter, colour)
             _draw(branch, side)
@@ -89,10 +82,6 @@ def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
                 _mark(branch, side, difference.seq, other)
         if difference is not None:
             _tell(rec, max(left, right, key=lambda side: len(side.events)), difference)
-        rec.flush()
-    finally:
-        rec.disconnect()
-        drain.close()
     return difference
 
 

@@ -20,6 +20,7 @@ from brrt.recording.drawing import Drawing
 from brrt.recording.recording import Recording
 from brrt.recording.scene import blueprint, document
 from brrt.recording.stamp import BLANK, is_damaged, stamp
+from brrt.recording.stream import connect, new_stream
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -56,21 +57,18 @@ class RerunSink:
         view: bool = False,
         embed: Any = None,
     ) -> None:
-        rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
         self._manifest, self._view = manifest, view
         self._path = None if path is None else Path(path)
         self._metrics = Metrics(manifest)
         self._layout = blueprint(manifest, world)
-        self._rec: Any = rr.RecordingStream(
-            viewer.APPLICATION, recording_id=recording_id(manifest), send_properties=False
-        )
-        rr.set_log_time_enabled(False, recording=self._rec)
+        self._rec: Any = new_stream(recording_id(manifest))
         if view:
             viewer.open_viewer(self._rec)
         self._drain = None if self._path is None else Drain(self._path)
         try:
             if embed is None:
-                self._connect(blueprint(manifest, world, live=True) if view else self._layout)
+                first = blueprint(manifest, world, live=True) if view else self._layout
+                connect(self._rec, first, self._drain, view=view)
             else:
                 embed.add_recording(self._rec, self._layout)
             self._write_head(world)
@@ -116,19 +114,6 @@ class RerunSink:
             self._flush()
         finally:
             self._disconnect()
-
-    def _connect(self, layout: Any) -> None:
-        sinks: list[Any] = []
-        if self._view:
-            sinks.append(rr.GrpcSink(viewer.address()))
-        if self._drain is None:
-            self._rec.set_sinks(*sinks, default_blueprint=layout)
-            return
-        try:
-            sinks.append(rr.FileSink(self._drain.inlet))
-            self._rec.set_sinks(*sinks, default_blueprint=layout)
-        finally:
-            self._drain.leave()
 
     def _disconnect(self) -> None:
         try:

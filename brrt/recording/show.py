@@ -2,16 +2,14 @@
 
 import hashlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from brrt.colours import GOAL, START
 from brrt.errors import RecordingError
-from brrt.recording import landscape, viewer
-from brrt.recording.drain import Drain
+from brrt.recording import landscape
+from brrt.recording.stream import filled, new_stream
 from brrt.worlds.world import World
 
 _GREATEST = 1e30
@@ -35,31 +33,13 @@ def show_world(world: World, *, path: Path | None = None, view: bool = False) ->
             f"{world.name}: Rerun draws in single precision, with coordinates up to {_GREATEST:g}; "
             f"make the world smaller"
         )
-    rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
     name = f"world-{hashlib.sha256(world.to_json().encode()).hexdigest()[:16]}"
-    rec: Any = rr.RecordingStream(viewer.APPLICATION, recording_id=name, send_properties=False)
-    rr.set_log_time_enabled(False, recording=rec)
-    if view:
-        viewer.open_viewer(rec)
-    drain = None if path is None else Drain(path)
-    try:
-        sinks: list[Any] = [rr.GrpcSink(viewer.address())] if view else []
-        try:
-            if drain is not None:
-                sinks.append(rr.FileSink(drain.inlet))
-            rec.set_sinks(*sinks, default_blueprint=_layout(world))
-        finally:
-            if drain is not None:
-                drain.leave()
+    rec = new_stream(name)
+    with filled(rec, _layout(world), path, view=view):
         landscape.log_world(rec, world)
         for mark, point, colour in (("start", world.start, START), ("goal", world.goal, GOAL)):
             if point is not None:
                 landscape.log_mark(rec, world, mark, point[None].astype(np.float32), colour)
-        rec.flush()
-    finally:
-        rec.disconnect()
-        if drain is not None:
-            drain.close()
 
 
 def _layout(world: World) -> rrb.Blueprint:
