@@ -153,8 +153,8 @@ def test_screenshot(brrt: Callable[..., Result], tmp_path: Path) -> None:
         assert (result.code, result.out, result.err) == (0, f"{name}: written\n", "")
     pictures = [opened((tmp_path / f"{number}.png").read_bytes()) for number in range(3)]
     assert pictures[0].shape == (600, 900, 3)
-    # On a busy machine a legend may still be fading in when the picture stands still.
-    assert (pictures[0] != pictures[1]).any(axis=2).mean() < 0.02
+    # In the bar at the top, the arrow back counts what the viewer has been told so far.
+    assert (pictures[0][40:] == pictures[1][40:]).all()
     blue = [of_colour(picture, TREE).sum() for picture in pictures]
     assert blue[0] > 500 > blue[2]  # a recording opens at its beginning
 

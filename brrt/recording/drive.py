@@ -25,6 +25,8 @@ _DYING_S = 3.0
 """Within which a viewer that does not answer any more may turn out to have ended."""
 _EMPTY_S = 2.0
 """After which a recording that has no times yet has none: nothing happened in it."""
+_ENVIRONMENT = {"RERUN_APP_ONLY": "true", "NO_COLOR": "1", "RUST_LOG": "error"}
+"""What it logs as news, it also shows above the picture for a while, if it is slow to start."""
 _NO_DRIVER = ("graphics adapter", "render context", "shared libraries", "Vulkan")
 """What it says as it dies for want of a driver."""
 
@@ -58,7 +60,7 @@ class Program:
             stdout=self._log,
             stderr=self._log,
             start_new_session=True,
-            env={**os.environ, "RERUN_APP_ONLY": "true", "NO_COLOR": "1"},
+            env={**os.environ, **_ENVIRONMENT},
         )
 
     def check(self) -> None:
