@@ -18,7 +18,7 @@ from brrt.recording.columns import TIMELINES, from_arrow, time_columns, to_arrow
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
 from brrt.recording.recording import Recording
-from brrt.recording.scene import blueprint, document
+from brrt.recording.scene import application, blueprint, document
 from brrt.recording.stamp import BLANK, is_damaged, stamp
 from brrt.recording.stream import connect, new_stream
 from brrt.replay.metrics import Metrics
@@ -61,9 +61,9 @@ class RerunSink:
         self._path = None if path is None else Path(path)
         self._metrics = Metrics(manifest)
         self._layout = blueprint(manifest, world)
-        self._rec: Any = new_stream(recording_id(manifest))
+        self._rec: Any = new_stream(recording_id(manifest), application(manifest, world))
         if view:
-            viewer.open_viewer(self._rec)
+            viewer.open_viewer()
         self._drain = None if self._path is None else Drain(self._path)
         try:
             if embed is None:
