@@ -36,7 +36,7 @@ class Difference:
         parts = [
             f"{name} {_value(left[name])} against {_value(right[name])}"
             for name in left
-            if not _same(left[name], right[name])
+            if not same(left[name], right[name])
         ]
         return f"event {self.seq} ({left['kind']}): {'; '.join(parts)}"
 
@@ -59,7 +59,7 @@ def first_difference(left: Iterable[Events], right: Iterable[Events]) -> Differe
     rest = a if a is not None else b
     assert rest is not None  # noqa: S101 - one of them is left
     seq, _ = rest.kinds_in_order()
-    event = _event_at(rest, seq)
+    event = event_at(rest, seq)
     return Difference(seq, event if a is not None else None, event if b is not None else None)
 
 
@@ -82,7 +82,7 @@ def _compare(a: Events, b: Events) -> Difference | None:
         return None
     first, kinds = a.kinds_in_order()
     if a.dof != b.dof:
-        ours, theirs = ({**(_event_at(e, first) or {}), "dof": e.dof} for e in (a, b))
+        ours, theirs = ({**(event_at(e, first) or {}), "dof": e.dof} for e in (a, b))
         return Difference(first, ours, theirs)
     other_first, other_kinds = b.kinds_in_order()
     seqs: list[int] = []
@@ -102,7 +102,7 @@ def _compare(a: Events, b: Events) -> Difference | None:
     if not seqs:
         return None
     seq = min(seqs)
-    return Difference(seq, _event_at(a, seq), _event_at(b, seq))
+    return Difference(seq, event_at(a, seq), event_at(b, seq))
 
 
 def _unequal(kind: Kind, a: Table, b: Table) -> NDArray[np.bool_]:
@@ -118,7 +118,8 @@ def _unequal(kind: Kind, a: Table, b: Table) -> NDArray[np.bool_]:
     return np.asarray(wrong)
 
 
-def _event_at(events: Events, seq: int) -> dict[str, Any] | None:
+def event_at(events: Events, seq: int) -> dict[str, Any] | None:
+    """Return an event's fields by name, with `kind` and `iteration`; None if it is not there."""
     for kind, table in events.tables.items():
         at = int(np.searchsorted(table["seq"], seq))
         if at < len(table) and table["seq"][at] == seq:
@@ -131,7 +132,8 @@ def _event_at(events: Events, seq: int) -> dict[str, Any] | None:
     return None
 
 
-def _same(a: Any, b: Any) -> bool:
+def same(a: Any, b: Any) -> bool:
+    """Whether two values of a field are the same, to the last bit."""
     return np.array_equal(a, b, equal_nan=not isinstance(a, str))
 
 
