@@ -13,7 +13,9 @@ from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
+from brrt.recording.versus import compare
 from brrt.replay.checks import Finding, check
+from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
@@ -29,6 +31,7 @@ __all__ = [
     "RRT",
     "BrrtError",
     "Chain",
+    "Comparison",
     "Difference",
     "Events",
     "Finding",
@@ -51,6 +54,7 @@ __all__ = [
     "Tree",
     "World",
     "check",
+    "compare",
     "first_difference",
     "forest",
     "make_robot",
