@@ -34,6 +34,12 @@ SCENARIOS = {
 }
 
 
+@pytest.fixture(autouse=True)
+def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write batch by batch, as a slow planner has it: what is gathered is one batch too."""
+    monkeypatch.setattr(rerun, "_GATHERED", 1)
+
+
 def write(path: Path, scenario: Scenario, *, batch: int = 50) -> tuple[Run, Events]:
     """Record a run with small batches; return it with its log."""
     run, memory = Run(scenario, batch=batch), Memory()

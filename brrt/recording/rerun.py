@@ -17,6 +17,7 @@ from brrt.recording import viewer
 from brrt.recording.columns import TIMELINES, from_arrow, time_columns, to_arrow
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
+from brrt.recording.gathering import Gathering
 from brrt.recording.recording import Recording
 from brrt.recording.scene import application, blueprint, document
 from brrt.recording.stamp import BLANK, is_damaged, stamp
@@ -29,6 +30,14 @@ _MAGIC = b"RRF2"
 _EVENTS, _OURS = "/ev/", "/brrt/"
 _MANIFEST, _WORLD, _END = "/brrt/manifest", "/brrt/world", "/brrt/end"
 _BATCH = 1 << 16
+
+_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.9, 0.1
+"""Events that are written together, and for how long one may wait for that: on its way to a file
+alone, and to somebody who is looking."""
+
+_WINDOW = 1 << 16
+"""How many bytes back the compression of Rerun's files (LZ4) finds what comes again. Each column of
+a chunk begins with the same offsets, 4 bytes a row, which so take no space but in the first one."""
 
 
 class RerunSink:
@@ -60,6 +69,9 @@ class RerunSink:
         self._manifest, self._view = manifest, view
         self._path = None if path is None else Path(path)
         self._metrics = Metrics(manifest)
+        live = view or embed is not None
+        self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if live else _FILE_S)
+        self._chunk = max(256, _WINDOW // (8 * manifest.dof + 5))
         self._layout = blueprint(manifest, world)
         self._rec: Any = new_stream(recording_id(manifest), application(manifest, world))
         if view:
@@ -79,19 +91,12 @@ class RerunSink:
             raise
 
     def write(self, events: Events) -> None:
-        """Write and draw a batch.
+        """Take a batch; small ones are gathered, then written and drawn.
 
         Raises:
             RecordingError: The disk is full, or something else is wrong with the file.
         """
-        for kind, table in events.tables.items():
-            entity = f"{_EVENTS}{kind.label}"
-            values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
-            components = rr.DynamicArchetype.columns(_archetype(entity), components=values)
-            self._rec.send_columns(entity, time_columns(table), components)
-        self._drawing.write(events)
-        self._metrics.write(events)
-        self._flush()
+        self._write(self._gathering.add(events))
 
     def close(self, *, whole: bool) -> None:
         """Write how it ended, and let go of file and viewer.
@@ -102,6 +107,7 @@ class RerunSink:
         if self._rec is None:
             return
         try:
+            self._write(self._gathering.take())
             self._drawing.close()
             figures = self._metrics.as_dict()
             end = {"events": str(figures["events"]), "stamp": BLANK}
@@ -114,6 +120,22 @@ class RerunSink:
             self._flush()
         finally:
             self._disconnect()
+
+    def _write(self, events: Events | None) -> None:
+        if events is None:
+            return
+        for kind, table in events.tables.items():
+            for first in range(0, len(table), self._chunk):
+                self._send(kind, table[first : first + self._chunk])
+        self._drawing.write(events)
+        self._metrics.write(events)
+        self._flush()
+
+    def _send(self, kind: Kind, table: Table) -> None:
+        entity = f"{_EVENTS}{kind.label}"
+        values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
+        columns = rr.DynamicArchetype.columns(_archetype(entity), components=values)
+        self._rec.send_columns(entity, time_columns(table), columns)
 
     def _disconnect(self) -> None:
         try:
