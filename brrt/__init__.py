@@ -19,6 +19,7 @@ from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
+from brrt.replay.moment import Moment
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
@@ -41,6 +42,7 @@ __all__ = [
     "McapSink",
     "Memory",
     "Metrics",
+    "Moment",
     "Planner",
     "Point",
     "Polygon",

@@ -8,6 +8,7 @@ from brrt.events import Events, Kind
 from brrt.replay.account import account
 from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
+from brrt.replay.moment import Moment, instant
 from brrt.robots import Robot
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -34,6 +35,28 @@ class Recording:
     def events(self) -> Events:
         """Return the whole log at once."""
         return Events.concat(self.manifest.dof, self.batches())
+
+    def at(
+        self,
+        *,
+        time: float | None = None,
+        event: int | None = None,
+        iteration: int | None = None,
+    ) -> Moment:
+        """Return the run as it stood at an instant, as `brrt replay --at` has it; or at its end.
+
+        Nothing is read until something of it is asked for, and then no further than the instant.
+
+        Args:
+            time: Seconds since the run began.
+            event: After this event.
+            iteration: After this iteration.
+
+        Raises:
+            BrrtError: More than one is given, or it is no number from 0 on.
+        """
+        limits = instant(time=time, event=event, iteration=iteration)
+        return Moment(self.manifest, self.world, self.batches, limits)
 
     def robot(self) -> Robot:
         """Make the robot as it was, settled in the world."""

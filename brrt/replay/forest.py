@@ -57,12 +57,45 @@ class Tree:
         Raises:
             RecordingError: The parents do not lead to a root.
         """
+        return self.q[self.lineage(node)]
+
+    def lineage(self, node: int) -> list[int]:
+        """Nodes from the root to a node.
+
+        Raises:
+            RecordingError: The parents do not lead to a root.
+        """
         lineage = [node]
         while self.parent[lineage[-1]] >= 0:
-            lineage.append(int(self.parent[lineage[-1]]))
+            above = int(self.parent[lineage[-1]])
+            if above >= len(self):
+                raise RecordingError(
+                    f"node {lineage[-1]} has the parent {above}, which is not there"
+                )
+            lineage.append(above)
             if len(lineage) > len(self):
                 raise RecordingError(f"node {node} is its own ancestor")
-        return self.q[lineage[::-1]]
+        return lineage[::-1]
+
+    def below(self, node: int) -> NDArray[np.int64]:
+        """Nodes that a node is an ancestor of, level by level, shape (m,).
+
+        Raises:
+            RecordingError: The node is its own ancestor.
+        """
+        children = np.argsort(self.parent, kind="stable")
+        parents = self.parent[children]
+        found, level, total = [np.empty(0, np.int64)], np.array([node]), 0
+        while total <= len(self):
+            first = np.searchsorted(parents, level, side="left")
+            count = np.searchsorted(parents, level, side="right") - first
+            before = np.cumsum(count) - count
+            level = children[np.repeat(first - before, count) + np.arange(count.sum())]
+            if not len(level):
+                return np.concatenate(found)
+            found.append(level)
+            total += len(level)
+        raise RecordingError(f"node {node} is its own ancestor")
 
 
 def leaves_of(parent: NDArray[np.signedinteger[Any]]) -> int:
