@@ -22,12 +22,14 @@ class Recording:
         world: The world it ran in.
         batches: Call it for the events, in batches, in order.
         result: The figures that the writer found at the end; None if it did not get there.
+        name: Of the file, without its folder.
     """
 
     manifest: Manifest
     world: World
     batches: Callable[[], Iterator[Events]]
     result: Mapping[str, Any] | None
+    name: str = ""
 
     def events(self) -> Events:
         """Return the whole log at once."""
