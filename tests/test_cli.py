@@ -286,6 +286,17 @@ def test_lists(name: str, brrt: Command) -> None:
         assert entry in text.out
 
 
+@pytest.mark.parametrize("name", ["planners", "robots", "worlds list"])
+def test_lists_show_one_alone(name: str, brrt: Command) -> None:
+    """A name after the list's picks one; a wrong one is named, with the nearest."""
+    every = brrt(*name.split(), "--json").json
+    one = min(every)
+    assert brrt(*name.split(), one, "--json").json == {one: every[one]}
+    wrong = brrt(*name.split(), one + "x")
+    assert wrong.code == 2
+    assert f"did you mean {one!r}?" in wrong.err
+
+
 def test_cache_folder_may_be_all_that_is_writable(tmp_path: Path) -> None:
     """Compiled kernels go to the user's cache folder, or nowhere where there is none."""
     code = "from brrt.kernels.jit import CACHE_FOLDER; print(CACHE_FOLDER)"
