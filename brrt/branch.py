@@ -188,7 +188,7 @@ def changed(
         if name in _CHANGEABLE:
             continue
         if name in (f.name for f in fields(Scenario)):
-            raise BrrtError(f"a branch keeps the {name} of the run that it goes on from")
+            raise BrrtError(f"a branch keeps the {name} of its recording; leave {name} away")
         raise unknown("setting of a branch", name, _CHANGEABLE)
     scenario = manifest.scenario
     values = {**scenario.as_dict(), **settings, "params": {**scenario.params, **params}}
