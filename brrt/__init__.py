@@ -8,6 +8,7 @@ metrics = run.execute([log])
 tree = brrt.forest(log.events())[0]
 """
 
+from brrt.again import BranchedRun, RepeatedRun
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
@@ -30,6 +31,7 @@ __all__ = [
     "PLANNERS",
     "ROBOTS",
     "RRT",
+    "BranchedRun",
     "BrrtError",
     "Chain",
     "Comparison",
@@ -49,6 +51,7 @@ __all__ = [
     "Problem",
     "Recording",
     "RecordingError",
+    "RepeatedRun",
     "Robot",
     "Run",
     "Scenario",

@@ -24,6 +24,7 @@ class Recording:
         batches: Call it for the events, in batches, in order.
         result: The figures that the writer found at the end; None if it did not get there.
         counts: Events of each kind, as the end of the file has them; None if it does not.
+        name: Of the file, without its folder.
     """
 
     manifest: Manifest
@@ -31,6 +32,7 @@ class Recording:
     batches: Callable[[], Iterator[Events]]
     result: Mapping[str, Any] | None
     counts: Mapping[Kind, int] | None = None
+    name: str = ""
 
     def events(self) -> Events:
         """Return the whole log at once."""

@@ -1,6 +1,5 @@
 """Events into Rerun and back: exact columns to replay from, and a picture beside them."""
 
-import hashlib
 import json
 import warnings
 from collections.abc import Iterator
@@ -181,8 +180,7 @@ class RerunSink:
 
 def recording_id(manifest: Manifest) -> str:
     """Name a recording: equal for runs that are the same in everything, the clock included."""
-    digest = hashlib.sha256(json.dumps(manifest.to_strings()).encode()).hexdigest()
-    return f"{manifest.scenario.planner}-{digest[:16]}"
+    return f"{manifest.scenario.planner}-{manifest.digest()[:16]}"
 
 
 def _archetype(entity: str) -> str:
