@@ -1,7 +1,7 @@
 """`brrt plan`: run a planner and record it."""
 
-from functools import partial
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
