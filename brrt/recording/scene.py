@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brrt.colours import GOAL, START, Colour
 from brrt.events import Reason, Source, Stage
 from brrt.recording import landscape
-from brrt.recording.columns import TIMELINES
+from brrt.recording.rrd_reader import TIMELINES
 from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds.world import World
