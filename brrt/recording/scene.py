@@ -67,6 +67,16 @@ def is_flat(manifest: Manifest) -> bool:
     return manifest.dim == 2
 
 
+def application(manifest: Manifest, world: World) -> str:
+    """Name what shares a layout with a run, and can: Rerun wants configurations to be alike."""
+    what = f"{manifest.dim}d"
+    if manifest.dof != manifest.dim:
+        what += f" {manifest.dof} dof"
+    if manifest.scenario.execute:
+        what += " driven"
+    return landscape.application(world, what)
+
+
 def tree_style(number: int) -> tuple[str, Colour]:
     """Return a tree's name and colour."""
     return _TREES.get(number, (str(number), OTHER))
