@@ -17,6 +17,7 @@ from brrt.planners import PLANNERS
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.replay.metrics import Metrics
+from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
 from brrt.settings import Settings
 from brrt.worlds.world import World
@@ -50,6 +51,7 @@ class Run:
         scenario: What to run.
         world: A world at hand, as one made by hand; the scenario's `world` is then its name in the
             log. By default the scenario makes its own.
+        robot: A robot at hand, as one whose file is gone; by default the scenario makes its own.
         planner: A planner of your own, any object with `Planner.solve`; the scenario's `planner`
             is then its name in the log. By default the registered one of that name.
         batch: Events in a batch at most; the log does not depend on it.
@@ -63,6 +65,7 @@ class Run:
         scenario: Scenario,
         *,
         world: World | None = None,
+        robot: Robot | None = None,
         planner: Solver | None = None,
         batch: int = 8192,
     ) -> None:
@@ -71,7 +74,8 @@ class Run:
         if planner is not None:
             scenario = _named(scenario, planner)
         self._planner = scenario.make_planner() if planner is None else planner
-        self.problem, self._smoother = scenario.make_problem(world), scenario.make_smoother()
+        self.problem = scenario.make_problem(world, robot)
+        self._smoother = scenario.make_smoother()
         self._execute = scenario.make_execute()
         self._compile()
         self._log = EventLog(self.problem.dof, batch, logical_clock=scenario.clock == "logical")

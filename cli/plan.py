@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, Watch, note, out, print_json, print_summary
+from .console import Code, Watch, note, out, print_json, print_summary, tell_of_compiling
 from .numbers import whole_number
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def plan(
         "clock": clock,
     }  # fmt: skip
     settings = _merged(scenario, given, param or [])
-    _tell_of_compiling()
+    tell_of_compiling()
     with Watch(settings.iterations, "preparing the planner").running() as watch:
         run = Run(settings)
         for line in run.problem.world.notes:
@@ -218,19 +218,6 @@ def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> li
 
         sinks.append(Background(RerunSink(run.manifest, world, path=rrd, view=view)))
     return sinks
-
-
-def _tell_of_compiling() -> None:
-    from brrt.kernels.jit import CACHE_FOLDER, on_compiling  # noqa: PLC0415
-
-    if CACHE_FOLDER is None:
-        note(
-            "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
-            "written; name one in the variable BRRT_CACHE_DIR"
-        )
-        return
-    text = "compiling the planner for this robot, once on this machine (10 to 20 s)"
-    on_compiling(lambda: note(text))
 
 
 def _show(metrics: "Metrics", watch: Watch) -> None:
