@@ -8,6 +8,7 @@ metrics = run.execute([log])
 tree = brrt.forest(log.events())[0]
 """
 
+from brrt.again import Again, plan_again
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
@@ -29,6 +30,7 @@ __all__ = [
     "PLANNERS",
     "ROBOTS",
     "RRT",
+    "Again",
     "BrrtError",
     "Chain",
     "Comparison",
@@ -59,5 +61,6 @@ __all__ = [
     "forest",
     "make_robot",
     "make_world",
+    "plan_again",
     "read",
 ]
