@@ -14,10 +14,13 @@ from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
+from brrt.recording.versus import compare
 from brrt.replay.checks import Finding, check
+from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
+from brrt.replay.moment import Moment
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
@@ -31,6 +34,7 @@ __all__ = [
     "BranchedRun",
     "BrrtError",
     "Chain",
+    "Comparison",
     "Difference",
     "Events",
     "Finding",
@@ -40,6 +44,7 @@ __all__ = [
     "McapSink",
     "Memory",
     "Metrics",
+    "Moment",
     "Planner",
     "Point",
     "Polygon",
@@ -54,6 +59,7 @@ __all__ = [
     "Tree",
     "World",
     "check",
+    "compare",
     "first_difference",
     "forest",
     "make_robot",

@@ -22,7 +22,7 @@ from brrt.worlds import World, make_world, world_beside
 RANDOM: Literal["random"] = "random"
 """A start or goal that the scenario's seed decides."""
 
-_MOST = 10**15
+MOST = 10**15
 """Above any count that a run could reach, and well within 64 bits."""
 
 _NOWHERE = np.full(3, np.nan)
@@ -186,7 +186,7 @@ class Scenario:
     def make_stop(self) -> Stop:
         """Make the budget."""
         planner = PLANNERS.get(self.planner, Planner)
-        usual = _MOST if self.time is not None else planner.default_iterations
+        usual = MOST if self.time is not None else planner.default_iterations
         iterations = usual if self.iterations is None else self.iterations
         return Stop(iterations=iterations, draws=self.draws, time_s=self.time)
 
@@ -241,8 +241,8 @@ def _whole(name: str, value: Any, *, low: int) -> None:
         raise BrrtError(f"{name} must be a whole number, not {value!r}")
     if value < low:
         raise BrrtError(f"{name} must be at least {low}, not {value}")
-    if name != "seed" and value > _MOST:
-        raise BrrtError(f"{name} must be at most {_MOST:,}, not {value}")
+    if name != "seed" and value > MOST:
+        raise BrrtError(f"{name} must be at most {MOST:,}, not {value}")
 
 
 def _configuration(name: str, value: Any) -> tuple[float, ...] | Literal["random"]:

@@ -1,10 +1,12 @@
 """`brrt plan`: run a planner and record it."""
 
+import shlex
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from .console import Code, Watch, note, out, print_json, print_summary
 from .instants import At, AtEvent, AtIteration, instant
@@ -289,7 +291,12 @@ def _report(metrics: "Metrics", mcap: Path | None, rrd: Path | None, *, as_json:
         print_json(figures)
         return
     print_summary(figures)
-    if mcap is not None:
-        out.print(f"\n{mcap}: look inside with [bold]brrt replay {mcap}[/bold]")
-    if rrd is not None:
-        out.print(f"{rrd}: watch it with [bold]rerun {rrd}[/bold]")
+    shown = rrd or mcap  # what is drawn already opens sooner
+    ways = [(mcap, "look inside", "replay"), (shown, "watch it", "view")]
+    for number, (path, what, command) in enumerate(way for way in ways if way[0] is not None):
+        typed = escape(shlex.quote(str(path)))
+        gap = "" if number else "\n"
+        out.print(
+            f"{gap}{escape(str(path))}: {what} with [bold]brrt {command} {typed}[/bold]",
+            soft_wrap=True,
+        )

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from brrt.errors import RecordingError
 from brrt.recording.container import MAGIC
-from brrt.recording.mcap_reader import CutError, read_mcap
+from brrt.recording.mcap_reader import read_mcap
 from brrt.recording.mcap_writer import McapSink
 from brrt.recording.memory import Memory
 from brrt.recording.recording import Recording
+from brrt.recording.sound import CutError
 
 _RRD = b"RRF"
 
@@ -28,7 +29,7 @@ def read(path: Path | str) -> Recording:
     if begin == MAGIC:
         return replace(read_mcap(path), name=path.name)
     if begin.startswith(_RRD):
-        from brrt.recording.rerun import read_rerun  # noqa: PLC0415 - costs half a second
+        from brrt.recording.rrd_reader import read_rerun  # noqa: PLC0415 - pyarrow is slow to load
 
         return replace(read_rerun(path), name=path.name)
     raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
