@@ -135,10 +135,11 @@ def rewires_near(case: Case, tally: Tally) -> None:
         sound = tree.of_rewires(tree.ledger.verdict == SOUND)
         nodes = tree.of_rewires(np.cumsum(tree.made.joins))[sound]
         length, table = tree.of_rewires(tree.length)[sound], tree.rewires[sound]
-        each = [
-            np.full(len(nodes), np.inf) if near is None else near.radius(nodes) for near in nears
-        ]
-        radius = np.choose(case.stretch(table), each)
+        radius, stretch = np.full(len(nodes), np.inf), case.stretch(table)
+        for number, near in enumerate(nears):
+            mine = stretch == number
+            if near is not None:
+                radius[mine] = near.radius(nodes[mine])
         tally.look(
             table, ~case.at_most(length, radius),
             lambda i, n=length, r=radius: f"a parent {n[i]:.12g} away; the radius is {r[i]:.12g}",  # type: ignore[misc]
