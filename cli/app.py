@@ -7,6 +7,7 @@ import typer
 
 from .console import Code, complain
 from .diff import diff
+from .explain import explain
 from .export import export
 from .lists import planners, robots
 from .plan import plan
@@ -33,6 +34,7 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 [bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
 
 [bold]brrt diff a.mcap b.mcap[/bold] compares two runs, and says where they part
+[bold]brrt explain run.mcap[/bold] says why it failed, or took long, and what to try
 
 [bold]brrt view run.mcap[/bold] shows the tree as it grows
 
@@ -48,6 +50,7 @@ app.command()(replay)
 app.command()(plot)
 app.command()(verify)
 app.command()(diff)
+app.command()(explain)
 app.command()(export)
 app.command()(view)
 app.command()(planners)

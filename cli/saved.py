@@ -37,5 +37,6 @@ class Saved:
             saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
             if not self._partial:
                 raise RecordingError(f"{error}; {saved}: {self._verb} with --partial") from None
+            if not self.cut:  # it may be read more than once
+                note(f"{error}; {saved}")
             self.cut = True
-            note(f"{error}; {saved}")

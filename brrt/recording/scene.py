@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from brrt.colours import GOAL, START, Colour
 from brrt.events import Reason, Source, Stage
 from brrt.recording import landscape
-from brrt.recording.columns import TIMELINES
 from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds.world import World
@@ -60,6 +59,9 @@ FADING_ITERATIONS, FADING_EVENTS, FADING_SECONDS = 300, 1000, 0.001
 """How long samples and rejections stay in sight on each timeline."""
 _BRIEFER = 5
 """Rewired edges stay for a part of that: there may be several in an iteration."""
+
+
+_TIMELINES = ("iteration", "event", "t")
 
 
 def is_flat(manifest: Manifest) -> bool:
@@ -227,7 +229,7 @@ def world_view(world: World, *, below: str = "", name: str = "World") -> Any:
         below: The entity below which the run was drawn.
         name: The view's.
     """
-    past = _ranges(*[(name, rrb.TimeRangeBoundary.infinite()) for name in TIMELINES])
+    past = _ranges(*[(name, rrb.TimeRangeBoundary.infinite()) for name in _TIMELINES])
     recent, just_now = _last(1), _last(_BRIEFER)
     shown = {f"/world/tree/{name}": past for name, _ in _TREES.values()}
     shown |= dict.fromkeys(_GROWING, past)
