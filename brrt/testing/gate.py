@@ -140,11 +140,10 @@ def gate(
     """
     numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
     check_question(numbers, alpha, margins)
-    old = _figures(against, numbers)
-    missing = [seed for seed in numbers if seed not in old.runs]
-    if missing:
-        raise BrrtError(f"{against} has no figures of seed {missing[0]}; renew it")
-    return judge(_figures(new, numbers), old, alpha=alpha, name=name, margins=margins)
+    old = _figures(against, "the old runs", numbers)
+    return judge(
+        _figures(new, "the new runs", numbers), old, alpha=alpha, name=name, margins=margins
+    )
 
 
 def judge(
@@ -156,9 +155,10 @@ def judge(
     pairs = [(old.runs[seed], new.runs[seed]) for seed in seeds]
     share = alpha / (len(margins) + 1)
     judged = [_solved(pairs, share)]
-    known = set().union(*old.runs.values()) & set().union(*new.runs.values()) - {"solved"}
+    known = set().union(*old.runs.values(), *new.runs.values()) - {"solved"}
     for figure, margin in margins.items():
-        if figure not in known:
+        # Where no run found a path, none has a cost, and its name is as good as any.
+        if figure not in known and any(run["solved"] for pair in pairs for run in pair):
             raise unknown("figure", figure, known)
         judged.append(_judge(figure, margin, pairs, seeds, share))
     identical = all(a[figure] == b[figure] for a, b in pairs for figure in a.keys() & b.keys())
@@ -192,12 +192,15 @@ def _value(run: Mapping[str, Any], name: str) -> float:
     return math.inf if value is None or not run["solved"] else float(value)
 
 
-def _figures(source: Source | Figures | Path | str, seeds: list[int]) -> Figures:
-    if isinstance(source, Figures):
-        return source.of_seeds(seeds)
+def _figures(source: Source | Figures | Path | str, name: str, seeds: list[int]) -> Figures:
     if isinstance(source, Path | str):
-        return Figures.load(Path(source)).of_seeds(seeds)
-    return Figures.of(source, seeds)
+        name, source = str(source), Figures.load(Path(source))
+    if not isinstance(source, Figures):
+        return Figures.of(source, seeds)
+    for seed in seeds:
+        if seed not in source.runs:
+            raise BrrtError(f"{name}: no figures of seed {seed}; renew them with all seeds")
+    return source.of_seeds(seeds)
 
 
 def check_question(seeds: list[int], alpha: float, margins: Mapping[str, Any]) -> None:
