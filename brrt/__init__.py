@@ -8,6 +8,7 @@ metrics = run.execute([log])
 tree = brrt.forest(log.events())[0]
 """
 
+from brrt.again import BranchedRun, RepeatedRun
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
@@ -19,6 +20,7 @@ from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
+from brrt.replay.moment import Moment
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
@@ -29,6 +31,7 @@ __all__ = [
     "PLANNERS",
     "ROBOTS",
     "RRT",
+    "BranchedRun",
     "BrrtError",
     "Chain",
     "Comparison",
@@ -41,12 +44,14 @@ __all__ = [
     "McapSink",
     "Memory",
     "Metrics",
+    "Moment",
     "Planner",
     "Point",
     "Polygon",
     "Problem",
     "Recording",
     "RecordingError",
+    "RepeatedRun",
     "Robot",
     "Run",
     "Scenario",

@@ -80,10 +80,10 @@ def test_the_parting_event_and_what_is_ahead_of_it(data: st.DataObject) -> None:
     event = log[Kind.EDGE][row]
     other = altered(run, Kind.EDGE, row, cost=np.nextafter(event["cost"], np.inf))
     found = compare(run, other)
-    assert found.part is not None
+    assert found.first is not None
     assert not found.equal
     seq = int(event["seq"])
-    assert [ahead["seq"] for ahead in found.part.before] == list(range(max(0, seq - 10), seq))
+    assert [ahead["seq"] for ahead in found.first.before] == list(range(max(0, seq - 10), seq))
     assert found.as_dict()["first"]["fields"] == ["cost"]
     told = found.lines()
     assert any(f"{seq:,}" in line and "*cost" in line for line in told)
@@ -137,7 +137,7 @@ def test_a_world_of_the_same_name_with_other_content() -> None:
     balls[3, 0] += 1e-9
     found = compare((manifest, world, log), (manifest, replace(world, balls=balls), log))
     assert not found.equal
-    assert found.part is None
+    assert found.first is None
     (row,) = found.settings
     assert (row.name, row.b) == ("world balls", "1 of them other ones")
 
@@ -153,7 +153,7 @@ def test_reads_no_further_than_needed() -> None:
             yield part
 
     a, b = ((manifest, world, batches(each)) for each in (log, live(OTHER)[2]))
-    assert compare(a, b).part is not None
+    assert compare(a, b).first is not None
     assert len(read_so_far) == 2
 
 

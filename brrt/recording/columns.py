@@ -1,4 +1,4 @@
-"""Events as Arrow columns, the way Rerun takes them, and back."""
+"""Events as Arrow columns, the way Rerun takes them; `rrd_reader` undoes that."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from brrt.events import Field, Table
 
 pa: Any = pyarrow  # mypy knows none of its names
-
-TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
-"""The timelines, and the column of the events that each holds."""
 
 
 def time_columns(rows: Table) -> list[rr.TimeColumn]:
@@ -35,26 +32,6 @@ def to_arrow(field: Field, values: NDArray[Any]) -> Any:
     if field.type == "q":
         return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
     return pa.array(values)
-
-
-def from_arrow(field: Field, column: Any, dof: int) -> NDArray[Any]:
-    """Undo `to_arrow`; Rerun has wrapped each value into a list.
-
-    Raises:
-        ValueError: There is not one value a row.
-    """
-    flat = column.flatten()
-    if field.type == "q[]":
-        ends = np.cumsum(np.asarray(column.value_lengths()))
-        rows = np.empty(len(ends), object)
-        for i, row in enumerate(np.split(flat.to_numpy(), ends[:-1])):
-            rows[i] = row.reshape(-1, dof)
-        return rows
-    if len(flat) != len(column):
-        raise ValueError(f"{field.name}: {len(flat)} values in {len(column)} rows")
-    if field.type == "q":
-        return np.asarray(flat.flatten().to_numpy().reshape(-1, dof))
-    return np.asarray(flat.to_numpy(zero_copy_only=False))
 
 
 def line_strips(places: NDArray[np.float32], lengths: int | Sequence[int]) -> Any:

@@ -1,7 +1,9 @@
 """A pipe into a file, for a writer that must not meet a full disk itself."""
 
+import fcntl
 import os
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 from brrt.errors import RecordingError
@@ -35,6 +37,8 @@ class Drain:
             raise self._cannot_write(error) from None
         self._inlet: int | None
         self._outlet, self._inlet = os.pipe()
+        with suppress(AttributeError, OSError):  # a larger pipe is for Linux, and if it likes
+            fcntl.fcntl(self._inlet, fcntl.F_SETPIPE_SZ, _BLOCK)
         self.inlet = f"/dev/fd/{self._inlet}"
         self._thread = threading.Thread(target=self._work, name="brrt drain", daemon=True)
         self._thread.start()

@@ -1,25 +1,21 @@
 """Two runs side by side: settings, versions, figures, and the first event at which they part."""
 
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from brrt.events import Events, Kind
-from brrt.replay.diff import Difference, event_at, first_difference
+from brrt.replay.diff import Difference, first_difference
 from brrt.replay.metrics import Metrics
 from brrt.replay.told import Row, settings_of, versions_of
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-BEFORE = 10
-"""Events that are told ahead of the first difference."""
-
 METRICS = (
     "path_cost", "smoothed_cost", "first_path_cost", "first_path_iteration", "iterations",
     "moves", "charged_moves", "deadline_misses",
 )  # fmt: skip
-"""Figures that two runs are compared by, without those that count events."""
+"""Figures that two runs are compared by, besides counts of events by kind."""
 
 TIMES = ("plan_time_s", "smooth_time_s", "first_path_s", "max_move_time_s")
 """Figures that the clock makes; by the logical clock they mean nothing."""
@@ -52,18 +48,6 @@ class Side:
     counts: Mapping[Kind, int] | None = None
 
 
-class Part(NamedTuple):
-    """Where two runs part.
-
-    Attributes:
-        difference: The first event that is not the same.
-        before: The events right ahead of it, the same in both.
-    """
-
-    difference: Difference
-    before: tuple[dict[str, Any], ...]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
     """What two runs have in common and what not; a is the first run, b the second.
@@ -75,8 +59,8 @@ class Comparison:
         notes: What differs and is no difference of the runs: a file's name, versions, platform.
         figures: Status and metrics of each; empty where a file has no end.
         timed: Whether the clocks of both were real; otherwise times mean nothing.
-        events: Events by kind of each; empty where they are not known.
-        part: Where the runs part; None where they do not.
+        events: Events by kind of each, as far as they are known.
+        first: The first event that differs, with the ones ahead of it; None where none does.
     """
 
     names: tuple[str, str]
@@ -85,12 +69,12 @@ class Comparison:
     figures: tuple[Mapping[str, Any], Mapping[str, Any]]
     timed: bool
     events: tuple[Mapping[str, int], Mapping[str, int]]
-    part: Part | None
+    first: Difference | None
 
     @property
     def equal(self) -> bool:
         """Whether the settings are the same and every event is, to the last bit, but the times."""
-        return self.part is None and not self.settings
+        return self.first is None and not self.settings
 
     def lines(self) -> list[str]:
         """Tell it in plain text, on one screen of 80 columns."""
@@ -108,10 +92,7 @@ class Comparison:
 def compare_sides(a: Side, b: Side) -> Comparison:
     """Compare two runs; their events are read up to the first difference, and no further."""
     readers = _Reader(a), _Reader(b)
-    found = first_difference(*readers)
-    part = None
-    if found is not None:
-        part = Part(found, readers[0].before(found.seq))
+    first = first_difference(*readers)
     return Comparison(
         (a.name, b.name),
         tuple(settings_of(a.manifest, a.world, b.manifest, b.world)),
@@ -119,18 +100,17 @@ def compare_sides(a: Side, b: Side) -> Comparison:
         (readers[0].figures(), readers[1].figures()),
         all(side.manifest.scenario.clock == "real" for side in (a, b)),
         (readers[0].counts(), readers[1].counts()),
-        part,
+        first,
     )
 
 
 class _Reader:
-    """Hands on a side's events, and keeps the newest of them and the figures so far."""
+    """Hands on a side's events, and keeps the figures so far."""
 
     def __init__(self, side: Side) -> None:
         self._side = side
         self._metrics = Metrics(side.manifest)
         self._counts: dict[Kind, int] = {}
-        self._recent: deque[Events] = deque()
         self._ended = False
 
     def __iter__(self) -> Iterator[Events]:
@@ -138,29 +118,17 @@ class _Reader:
             self._metrics.write(batch)
             for kind, count in batch.counts.items():
                 self._counts[kind] = self._counts.get(kind, 0) + count
-            self._recent.append(batch)
-            while sum(map(len, self._recent)) - len(self._recent[0]) >= len(batch) + BEFORE:
-                self._recent.popleft()
             yield batch
         self._ended = True
-
-    def before(self, seq: int) -> tuple[dict[str, Any], ...]:
-        """Return the events right ahead of a number."""
-        found = []
-        for number in range(max(0, seq - BEFORE), seq):
-            events = (event_at(batch, number) for batch in self._recent)
-            found += [{"seq": number, **event} for event in events if event is not None]
-        return tuple(found)
 
     def figures(self) -> Mapping[str, Any]:
         """Return the run's figures: its own fold where it was read to its end."""
         return self._metrics.as_dict() if self._ended else (self._side.result or {})
 
     def counts(self) -> Mapping[str, int]:
-        """Return how many events of each kind there are; of a result, those that it has."""
-        if self._ended:
-            return {kind.label: self._counts[kind] for kind in sorted(self._counts)}
-        if self._side.counts is not None:
-            return {kind.label: count for kind, count in sorted(self._side.counts.items())}
-        result = self._side.result or {}
-        return {kind.label: result[name] for name, kind in _COUNTED.items() if result.get(name)}
+        """Return how many events of each kind there are, as far as that is known."""
+        side, result = self._side, self._side.result or {}
+        if self._ended or side.counts is not None:
+            known = self._counts if self._ended else side.counts or {}
+            return {kind.label: known.get(kind, 0) for kind in Kind}
+        return {kind.label: result[name] for name, kind in _COUNTED.items() if name in result}

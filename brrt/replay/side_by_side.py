@@ -2,13 +2,13 @@
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from brrt.replay.compare import METRICS, TIMES, Comparison, Part
-from brrt.replay.diff import same
+from brrt.replay.compare import METRICS, TIMES, Comparison
+from brrt.replay.diff import Difference, same
 from brrt.replay.told import Row
 
 WIDTH = 80
@@ -35,7 +35,7 @@ def _lines(found: Comparison) -> Iterator[str]:
     yield from _outcome(found)
     yield from _events(found)
     yield ""
-    yield from _part(found.part, found.names)
+    yield from _parting(found)
 
 
 def _rows(title: str, rows: tuple[Row, ...], none: str) -> Iterator[str]:
@@ -69,47 +69,55 @@ def _outcome(found: Comparison) -> Iterator[str]:
 
 def _events(found: Comparison) -> Iterator[str]:
     """Tell the events by kind."""
+    rows = [Row("events", *(each.get("events") for each in found.figures)), *_kinds(found)]
+    for name, a, b in rows:
+        yield _row(name if name == "events" else f"  {name}", _count(a), _count(b), _change(a, b))
+
+
+def _kinds(found: Comparison) -> Iterator[Row]:
+    """Yield the kinds of events that one of the runs has, with None where that is not known."""
     a, b = found.events
-    sums = [sum(each.values()) if each else None for each in (a, b)]
-    yield _row("events", _count(sums[0]), _count(sums[1]), _change(*sums))
     for name in dict.fromkeys([*a, *b]):
-        x, y = (None if not each else each.get(name, 0) for each in (a, b))
-        yield _row(f"  {name}", _count(x), _count(y), _change(x, y))
+        if a.get(name) or b.get(name):
+            yield Row(name, a.get(name), b.get(name))
 
 
-def _part(part: Part | None, names: tuple[str, str]) -> Iterator[str]:
+def _parting(found: Comparison) -> Iterator[str]:
     """Tell where they part, and how to look at it."""
-    if part is None:
-        yield "The events are equal, every one to the last bit but the times."
+    first = found.first
+    if first is None:
+        but = "; the settings alone differ" if found.settings else ""
+        yield f"The events are equal, every one to the last bit but the times{but}."
         return
-    seq, (a, b) = part.difference.seq, (part.difference.left, part.difference.right)
+    yield from parting(first, ("A", "B"))
+    if all(found.names):
+        a, b = (shlex.quote(name) for name in found.names)
+        yield ""
+        yield f"brrt view {a} {b}"
+        yield f"brrt replay {a} --at-event {first.seq}"
+
+
+def parting(first: Difference, names: tuple[str, str]) -> Iterator[str]:
+    """Tell the first event that differs in two runs, and the ones ahead of it.
+
+    Args:
+        first: The event.
+        names: What the runs are called; the shorter, the more there is to see.
+    """
+    seq, digits, margin = first.seq, len(f"{first.seq:,}"), max(map(len, names))
     yield f"They part at event {seq:,}; ahead of it:" if seq else "They part at their first event:"
-    digits = len(f"{seq:,}")
-    for event in part.before:
-        yield _fit(f"  {event['seq']:>{digits},}  {_event(event)}")
-    marked = {row.name for row in fields(part)}
-    for letter, theirs in (("A", a), ("B", b)):
+    for event in first.before:
+        yield _fit(f"{'':{margin}} {event['seq']:>{digits},}  {_event(event)}")
+    marked = first.fields
+    for name, theirs in zip(names, (first.left, first.right), strict=True):
         text = "the run has ended" if theirs is None else _event(theirs, marked)
-        yield _fit(f"{letter} {seq:>{digits},}  {text}")
-    for row in fields(part):
-        yield _fit(f"  {'':{digits}}  {row.name}: {' against '.join(_apart(row.a, row.b))}")
-    if not all(names):
-        return
-    a_name, b_name = (shlex.quote(name) for name in names)
-    yield ""
-    yield f"brrt view {a_name} {b_name}"
-    yield f"brrt replay {a_name} --at-event {seq}"
+        yield _fit(f"{name:{margin}} {seq:>{digits},}  {text}")
+    for name in marked:
+        values = _apart(*((theirs or {})[name] for theirs in (first.left, first.right)))
+        yield _fit(f"{'':{margin}} {'':{digits}}  {name}: {' against '.join(values)}")
 
 
-def fields(part: Part) -> list[Row]:
-    """Return the fields in which the parting events differ; none where kinds differ or one ends."""
-    a, b = part.difference.left, part.difference.right
-    if a is None or b is None or a["kind"] != b["kind"]:
-        return []
-    return [Row(name, a[name], b[name]) for name in a if not same(a[name], b.get(name))]
-
-
-def _event(event: Mapping[str, Any], marked: set[str] | frozenset[str] = frozenset()) -> str:
+def _event(event: Mapping[str, Any], marked: Collection[str] = ()) -> str:
     """Tell an event in one line; a star marks the fields that differ."""
     parts = [f"{event['kind']:9}"]
     for name, value in event.items():
@@ -176,13 +184,8 @@ def as_dict(found: Comparison) -> dict[str, Any]:
     a, b = found.figures
     metrics = {
         name: {"a": a.get(name), "b": b.get(name), "change": _ratio(a.get(name), b.get(name))}
-        for name in METRICS + TIMES
+        for name in ("events", *METRICS, *TIMES)
     }
-    kinds = dict.fromkeys([*found.events[0], *found.events[1]])
-    counts = [
-        (lambda name, each=each: each.get(name, 0) if each else None) for each in found.events
-    ]
-    part = found.part
     return {
         "equal": found.equal,
         "names": list(found.names),
@@ -192,18 +195,19 @@ def as_dict(found: Comparison) -> dict[str, Any]:
             {"solved": each.get("solved"), "status": each.get("status")} for each in (a, b)
         ],
         "metrics": metrics,
-        "events": {name: {"a": counts[0](name), "b": counts[1](name)} for name in kinds},
-        "first": None if part is None else _part_json(part),
+        "events": {name: {"a": x, "b": y} for name, x, y in _kinds(found)},
+        "first": None if found.first is None else parting_as_dict(found.first, ("a", "b")),
     }
 
 
-def _part_json(part: Part) -> dict[str, Any]:
+def parting_as_dict(first: Difference, names: tuple[str, str]) -> dict[str, Any]:
+    """Return the first event that differs as JSON has it; see `parting`."""
     return {
-        "seq": part.difference.seq,
-        "a": _plain(part.difference.left),
-        "b": _plain(part.difference.right),
-        "fields": [row.name for row in fields(part)],
-        "before": [_plain(event) for event in part.before],
+        "seq": first.seq,
+        names[0]: _plain(first.left),
+        names[1]: _plain(first.right),
+        "fields": first.fields,
+        "before": [_plain(event) for event in first.before],
     }
 
 
