@@ -55,12 +55,12 @@ class McapSink:
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
         try:
             self._file = Container(self._path, library)
-        except OSError as error:
-            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
-        self._file.declare(*_schemas(manifest.dof), *_channels())
-        with self._failing():
+            self._file.declare(*_schemas(manifest.dof), *_channels())
             self._file.metadata(RUN, manifest.to_strings())
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
+            self._file.flush()
+        except OSError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
 
     def write(self, events: Events) -> None:
         """Take a batch; small ones are gathered into one chunk."""
@@ -73,6 +73,16 @@ class McapSink:
         late = now - self._pending_since > _CHUNK_SECONDS
         if late or sum(map(len, self._pending)) >= _CHUNK_EVENTS:
             self._flush_chunk()
+
+    def annotate(self, name: str, texts: dict[str, str]) -> None:
+        """Keep named texts in the file, behind the events so far.
+
+        Raises:
+            RecordingError: The disk does not take them.
+        """
+        self._flush_chunk()
+        with self._failing():
+            self._file.metadata(name, texts)
 
     def close(self, *, whole: bool) -> None:
         """Write what is pending, the figures, the index and the footer."""
@@ -98,7 +108,7 @@ class McapSink:
         except OSError as error:
             raise RecordingError(
                 f"cannot go on writing {self._path}: {error.strerror or error}; "
-                f"what was written before can be replayed with --partial"
+                f"what was written before is whole: replay it with --partial, or see brrt recover"
             ) from None
 
     def _flush_chunk(self) -> None:
