@@ -15,6 +15,7 @@ from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
 from brrt.recording.versus import compare
+from brrt.repeat import Again, plan_again
 from brrt.replay.checks import Finding, check
 from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
@@ -31,6 +32,7 @@ __all__ = [
     "PLANNERS",
     "ROBOTS",
     "RRT",
+    "Again",
     "BranchedRun",
     "BrrtError",
     "Chain",
@@ -64,5 +66,6 @@ __all__ = [
     "forest",
     "make_robot",
     "make_world",
+    "plan_again",
     "read",
 ]

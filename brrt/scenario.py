@@ -157,7 +157,8 @@ class Scenario:
 
     def with_stop_at(self, iterations: int) -> "Scenario":
         """Return the scenario of a run that the clock or a person cut, ended at that iteration."""
-        return replace(self, draws=max(1, iterations), time=None)
+        most = self.make_stop().iterations
+        return replace(self, draws=max(1, iterations), iterations=most, time=None)
 
     def make_planner(self) -> Planner:
         """Make the planner with its settings.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from .console import Code, Watch, note, out, print_json, print_summary
+from .console import Code, Watch, note, out, print_json, print_summary, tell_of_compiling
 from .instants import At, AtEvent, AtIteration, instant
 from .numbers import whole_number
 
@@ -208,7 +208,7 @@ def plan(
 
         check_parent(parent, scenario, mcap, rrd)
         prepare = partial(go_on, parent, limits, wanted, _params(param or []))
-    _tell_of_compiling()
+    tell_of_compiling()
     with Watch(iterations, "preparing the planner").running() as watch:
         run = prepare()
         for line in run.problem.world.notes:
@@ -260,19 +260,6 @@ def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> li
 
         sinks.append(Background(RerunSink(run.manifest, world, path=rrd, view=view)))
     return sinks
-
-
-def _tell_of_compiling() -> None:
-    from brrt.kernels.jit import CACHE_FOLDER, on_compiling  # noqa: PLC0415
-
-    if CACHE_FOLDER is None:
-        note(
-            "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
-            "written; name one in the variable BRRT_CACHE_DIR"
-        )
-        return
-    text = "compiling the planner for this robot, once on this machine (10 to 20 s)"
-    on_compiling(lambda: note(text))
 
 
 def _show(metrics: "Metrics", watch: Watch) -> None:

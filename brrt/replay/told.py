@@ -44,8 +44,8 @@ def settings_of(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Ite
         yield from _row(name, getattr(ours, name), getattr(theirs, name))
     limits = (each.make_stop().iterations for each in (ours, theirs))
     yield from _row("iterations", *("no limit" if n >= MOST else n for n in limits))
-    yield from _table("param", ours.settings(), theirs.settings())
-    yield from _table("robot", _robot(a, a_world), _robot(b, b_world))
+    yield from rows_of("param", ours.settings(), theirs.settings())
+    yield from rows_of("robot", _robot(a, a_world), _robot(b, b_world))
     yield from _row("start", list(a.start), list(b.start))
     yield from _row("goal", list(a.goal), list(b.goal))
     yield from _worlds(a_world, b_world)
@@ -55,7 +55,7 @@ def versions_of(a: Manifest, b: Manifest) -> Iterator[Row]:
     """Yield what differs and leaves the run the same: names, clock, versions and platform."""
     for name in ("world", "robot", "clock"):
         yield from _row(name, getattr(a.scenario, name), getattr(b.scenario, name))
-    yield from _table("", a.made_by, b.made_by)
+    yield from rows_of("", a.made_by, b.made_by)
 
 
 def _row(name: str, a: Any, b: Any) -> Iterator[Row]:
@@ -63,7 +63,8 @@ def _row(name: str, a: Any, b: Any) -> Iterator[Row]:
         yield Row(name, a, b)
 
 
-def _table(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Row]:
+def rows_of(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield what differs in two tables of named values, with a word ahead of each name."""
     for name in dict.fromkeys([*a, *b]):
         yield from _row(f"{prefix} {name}".strip(), a.get(name), b.get(name))
 
