@@ -94,8 +94,8 @@ class Golden:
             run: A scenario, or the name of a scenario file; a `Run`, with a planner of your own if
                 you like; a `Recording`, or the name of a recording, by whatever program. Without
                 it the golden run's own scenario is planned anew.
-            tolerance: For each float x of the golden run, an error of tolerance * max(1, abs(x))
-                counts as equal; by default every bit counts. Times never count.
+            tolerance: How far apart numbers may be, relative to the greater, and to 1 where both
+                are less; by default every bit counts. Times never count.
         """
         __tracebackhide__ = True
         with _failing():
@@ -145,8 +145,7 @@ class Golden:
 
     def _compare(self, path: Path, fresh: Recording, tolerance: float, name: str) -> Comparison:
         kept = read(path)
-        near = golden.near(fresh, kept, tolerance)
-        return compare(kept, near, names=(self._files.told(path), name))
+        return compare(kept, fresh, names=(self._files.told(path), name), tolerance=tolerance)
 
 
 class Gate:
