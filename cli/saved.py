@@ -39,5 +39,6 @@ class Saved:
                 raise RecordingError(
                     f"{error}; {saved}: {self._verb} with --partial, or save them with brrt recover"
                 ) from None
+            if not self.cut:  # it may be read more than once
+                note(f"{error}; {saved}")
             self.cut = True
-            note(f"{error}; {saved}")

@@ -6,8 +6,10 @@ import resource
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,7 @@ from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, RecordingError, Run, Scenario, read
 from brrt.events import FIELDS, Stage, table_dtype
-from brrt.recording import CutError, Memory, canvas, fading, scene, sketch, trees
+from brrt.recording import CutError, Memory, canvas, fading, rerun, scene, sketch, trees, viewer
 from brrt.recording.rerun import RerunSink, recording_id
 from brrt.recording.rrd_frames import FRAME
 from brrt.recording.rrd_outline import Outline
@@ -33,6 +35,12 @@ SCENARIOS = {
     "3d": Scenario(world="boxes3d:n=60", seed=1, params={"step": 1.5}),
     "unsolved": Scenario(world="spheres3d:n=9", iterations=40),
 }
+
+
+@pytest.fixture(autouse=True)
+def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write batch by batch, as a slow planner has it: what is gathered is one batch too."""
+    monkeypatch.setattr(rerun, "_GATHERED", 1)
 
 
 def write(path: Path, scenario: Scenario, *, batch: int = 50) -> tuple[Run, Events]:
@@ -122,7 +130,8 @@ def test_stock_reader_finds_every_field(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["3d"])
     reader = RrdReader(path)
-    assert [store.application_id for store in reader.recordings()] == ["brrt"]
+    (store,) = reader.recordings()
+    assert store.application_id == "brrt 3d 100 x 100 x 100"
     assert len(reader.blueprints()) == 1
     for kind, table in log.tables.items():
         entity = f"/ev/{kind.label}"
@@ -308,7 +317,7 @@ def test_cut_anywhere(tmp_path: Path) -> None:
     data, saved = path.read_bytes(), []
     for length in [0, 3, 4, 12, 50, *range(100, len(data) - 40, len(data) // 40)]:
         path.write_bytes(data[:length])
-        batches = list[Events]()
+        batches: list[Events] = []
         with pytest.raises(RecordingError) as told:
             batches.extend(read_rerun(path).batches())
         assert str(told.value).startswith(str(path))
@@ -443,32 +452,69 @@ def test_disk_that_fills_up(tmp_path: Path) -> None:
 
 def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The run and its file do not mind that someone closes the viewer."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = int(free.getsockname()[1])
-    monkeypatch.setattr("brrt.recording.viewer.PORT", port)
-    monkeypatch.setattr(rr, "spawn", lambda **_: None)
-    viewer = rr.RecordingStream("viewer", send_properties=False)
-    viewer.serve_grpc(grpc_port=port)
+    port = viewer.free_port()
+    monkeypatch.setattr(viewer, "PORT", port)
+    other = rr.RecordingStream("viewer", send_properties=False)
+    other.serve_grpc(grpc_port=port)
     run, memory = Run(SCENARIOS["2d"], batch=50), Memory()
     sink = RerunSink(run.manifest, run.problem.world, path=tmp_path / "run.rrd", view=True)
     for number, batch in enumerate(run.events()):
         sink.write(batch)
         memory.write(batch)
         if number == 3:
-            viewer.disconnect()
+            other.disconnect()
     sink.close(whole=True)
     assert same(read(tmp_path / "run.rrd").events(), memory.events())
 
 
-def test_no_viewer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A viewer that does not start is told in one line."""
-
-    def spawn(**_: object) -> None:
-        raise RuntimeError("Failed to find it.\n\nMore about that.")
-
-    monkeypatch.setattr(rr, "spawn", spawn)
+def test_no_viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A viewer that is not there, or does not start, is told in one line."""
+    monkeypatch.setattr(viewer, "PORT", viewer.free_port())
+    dying = tmp_path / "dying"
+    dying.write_text("#!/bin/sh\necho one; echo 'no screen' >&2; exit 3\n")
+    dying.chmod(0o755)
     run = Run(SCENARIOS["unsolved"])
-    with pytest.raises(RecordingError) as told:
-        RerunSink(run.manifest, run.problem.world, view=True)
-    assert str(told.value) == "cannot open the Rerun viewer: Failed to find it."
+    for program, message in (
+        (None, "there is no Rerun viewer; pip install rerun-sdk brings it"),
+        (dying, "the Rerun viewer ended: no screen"),
+    ):
+        monkeypatch.setattr(viewer, "program", lambda found=program: found)
+        with pytest.raises(RecordingError) as told:
+            RerunSink(run.manifest, run.problem.world, view=True)
+        assert str(told.value) == message
+
+
+@pytest.mark.parametrize("answer", [b"", b"HTTP/1.0 505 No\r\n\r\n"])
+def test_no_viewer_but_something_else(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever listens where a viewer should, we do not wait for it for ever."""
+    monkeypatch.setattr(viewer, "_HELLO_S", 0.2)
+    with socket.create_server((viewer.HERE, 0)) as server:
+        monkeypatch.setattr(viewer, "PORT", server.getsockname()[1])
+        if answer:
+            threading.Thread(target=_answer, args=(server, answer), daemon=True).start()
+        with pytest.raises(RecordingError, match=f"listens at port {viewer.PORT}; end it, or"):
+            viewer.open_viewer()
+
+
+def _answer(server: socket.socket, answer: bytes) -> None:
+    held = []
+    while True:
+        try:
+            connection, _ = server.accept()
+        except OSError:
+            return
+        connection.sendall(answer)
+        held.append(connection)
+
+
+def test_layouts_are_shared_by_what_can_share_them() -> None:
+    """A viewer keeps one layout, and one kind of configuration, for each application."""
+    pairs = set()
+    for path in (Path(__file__).parents[1] / "recordings").glob("*.mcap"):
+        manifest, world = read(path).manifest, read(path).world
+        bounds = (*world.lower, *world.upper)
+        what = (manifest.dim, manifest.dof, manifest.scenario.execute, bounds)
+        for each in (world, replace(world, y_down=True)) if world.dim == 2 else (world,):
+            pairs.add((scene.application(manifest, each), (*what, each.y_down)))
+    names, wholes = zip(*pairs, strict=True)
+    assert len(set(names)) == len(set(wholes)) == len(pairs) > 6

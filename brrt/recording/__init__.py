@@ -1,5 +1,6 @@
 """Recordings: sinks that write them, and `read` for what they wrote."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from brrt.errors import RecordingError
@@ -26,11 +27,11 @@ def read(path: Path | str) -> Recording:
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     if begin == MAGIC:
-        return read_mcap(path)
+        return replace(read_mcap(path), name=path.name)
     if begin.startswith(_RRD):
         from brrt.recording.rrd_reader import read_rerun  # noqa: PLC0415 - pyarrow is slow to load
 
-        return read_rerun(path)
+        return replace(read_rerun(path), name=path.name)
     raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
 
 

@@ -1,11 +1,13 @@
 """A pipe into a file, for a writer that must not meet a full disk itself."""
 
+import fcntl
 import os
 import select
 import threading
 import time
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -45,6 +47,8 @@ class Drain:
             raise self._cannot_write(error) from None
         self._inlet: int | None
         self._outlet, self._inlet = os.pipe()
+        with suppress(AttributeError, OSError):  # a larger pipe is for Linux, and if it likes
+            fcntl.fcntl(self._inlet, fcntl.F_SETPIPE_SZ, _BLOCK)
         self.inlet = f"/dev/fd/{self._inlet}"
         self._at_work = threading.Lock()
         self._thread = threading.Thread(target=self._work, name="brrt drain", daemon=True)

@@ -1,7 +1,6 @@
 """What is shown for a moment: samples, rejected extensions, edges that were rewired."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +39,8 @@ class Fading:
     def samples(self, table: Table) -> None:
         """Draw samples."""
         for source in Source:
-            mine = table[table["source"] == source]
             name = source.name.lower()
-            rows = mine[self._shown(mine, f"{name} samples")]
+            rows = table[self._shown(table, table["source"] == source, f"{name} samples")]
             if len(rows):
                 points = self._canvas.points.columns(positions=self._canvas.places(rows["q"]))
                 self._canvas.send(f"/world/samples/{name}", rows, _even_rows(len(rows)), points)
@@ -50,18 +48,20 @@ class Fading:
     def rejects(self, table: Table) -> None:
         """Draw from where to where extensions were tried in vain."""
         for reason in Reason:
-            mine = table[table["reason"] == reason]
             name = reason.name.lower()
-            rows = mine[self._shown(mine, f"{name} rejections")]
+            rows = table[self._shown(table, table["reason"] == reason, f"{name} rejections")]
             if len(rows):
                 self._send_lines(f"rejected/{name}", rows, self._attempts(rows))
 
-    def rewired(self, tree: str, table: Table, ends: NDArray[np.float32]) -> None:
-        """Highlight the new edges of a tree by their ends, shape (2 n, dim)."""
-        shown = self._shown(table, f"rewired edges of the {tree} tree")
-        if shown.any():
-            kept = ends.reshape(-1, 2, self._canvas.dim)[shown].reshape(-1, self._canvas.dim)
-            self._send_lines(f"rewired/{tree}", table[shown], kept)
+    def rewired(self, tree: int, table: Table) -> None:
+        """Highlight the new edges of a tree."""
+        name, sketch = scene.tree_style(tree)[0], self._sketches[tree]
+        every = np.ones(len(table), np.bool_)
+        rows = table[self._shown(table, every, f"rewired edges of the {name} tree")]
+        if len(rows):
+            ends = sketch.places(rows["parent"]), sketch.places(rows["node"])
+            lines = np.stack(ends, axis=1).reshape(-1, self._canvas.dim)
+            self._send_lines(f"rewired/{name}", rows, lines)
 
     def _send_lines(self, name: str, rows: Table, ends: NDArray[np.float32]) -> None:
         strips = self._canvas.strips(ends, 2)
@@ -77,16 +77,17 @@ class Fading:
         ends[:, 1] = self._canvas.places(rejects["q"])
         return ends.reshape(-1, dim)
 
-    def _shown(self, table: Table, what: str) -> NDArray[Any]:
-        """Tell which rows of a table are drawn: not all if there have been many."""
+    def _shown(self, table: Table, mine: NDArray[np.bool_], what: str) -> NDArray[np.int64]:
+        """Return which of a table's rows that are meant are drawn: not all after many."""
+        which = np.flatnonzero(mine)
         first = self._seen.get(what, 0)
-        self._seen[what] = first + len(table)
-        if first <= _IN_FULL < first + len(table):
+        self._seen[what] = end = first + len(which)
+        if first <= _IN_FULL < end:
             text = f"{what}: beyond {_IN_FULL:,} one in {_STRIDE} is drawn"
-            self._canvas.tell(table[-1], text)
-        number = np.arange(first, first + len(table))
-        shown: NDArray[Any] = (number < _IN_FULL) | (number % _STRIDE == 0)
-        return shown
+            self._canvas.tell(table[which[-1]], text)
+        number = np.arange(first, end)
+        shown = (number < _IN_FULL) | (number % _STRIDE == 0)
+        return np.asarray(which[shown])
 
 
 def _even_rows(count: int) -> NDArray[np.int64]:

@@ -1,6 +1,5 @@
 """Events into Rerun: exact columns to replay from, and a picture beside them."""
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -8,18 +7,27 @@ from typing import Any
 import rerun as rr
 
 from brrt.errors import RecordingError
-from brrt.events import FIELDS, Events
+from brrt.events import FIELDS, Events, Kind, Table
 from brrt.recording import viewer
 from brrt.recording.columns import time_columns, to_arrow
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
+from brrt.recording.gathering import Gathering
 from brrt.recording.rrd_outline import CHECK, END, EVENTS, MANIFEST, OURS, WORLD, archetype
-from brrt.recording.scene import blueprint, document
+from brrt.recording.scene import application, blueprint, document
 from brrt.recording.stamp import WRITTEN, stamp
 from brrt.recording.stream import connect, new_stream
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
+
+_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.5, 0.1
+"""Events that are written together, and for how long one may wait for that: on its way to a file
+alone, and to somebody who is looking."""
+
+_WINDOW = 1 << 16
+"""How many bytes back the compression of Rerun's files (LZ4) finds what comes again. Each column of
+a chunk begins with the same offsets, 4 bytes a row, which so take no space but in the first one."""
 
 
 class RerunSink:
@@ -51,10 +59,13 @@ class RerunSink:
         self._manifest, self._view = manifest, view
         self._path = None if path is None else Path(path)
         self._metrics = Metrics(manifest)
+        live = view or embed is not None
+        self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if live else _FILE_S)
+        self._chunk = max(256, _WINDOW // (8 * manifest.dof + 5))
         self._layout = blueprint(manifest, world)
-        self._rec: Any = new_stream(recording_id(manifest))
+        self._rec: Any = new_stream(recording_id(manifest), application(manifest, world))
         if view:
-            viewer.open_viewer(self._rec)
+            viewer.open_viewer()
         self._drain = None if self._path is None else Drain(self._path)
         try:
             if embed is None:
@@ -70,22 +81,16 @@ class RerunSink:
             raise
 
     def write(self, events: Events) -> None:
-        """Write and draw a batch.
+        """Take a batch; small ones are gathered, then written and drawn.
 
         Raises:
             RecordingError: The disk is full, or something else is wrong with the file.
         """
-        for kind, table in events.tables.items():
-            entity = f"{EVENTS}{kind.label}"
-            values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
-            components = rr.DynamicArchetype.columns(archetype(entity), components=values)
-            self._rec.send_columns(entity, time_columns(table), components)
-        self._drawing.write(events)
-        self._metrics.write(events)
-        self._flush()
+        self._write(self._gathering.add(events))
 
     def annotate(self, name: str, texts: dict[str, str]) -> None:
-        """Keep named texts in the file."""
+        """Keep named texts in the file, behind the events so far."""
+        self._write(self._gathering.take())
         self._write_texts(f"{OURS}{name.rpartition('.')[2]}", texts)
 
     def close(self, *, whole: bool) -> None:
@@ -97,6 +102,7 @@ class RerunSink:
         if self._rec is None:
             return
         try:
+            self._write(self._gathering.take())
             self._drawing.close()
             figures = self._metrics.as_dict()
             end = {"events": str(figures["events"]), "stamp": WRITTEN}
@@ -109,6 +115,22 @@ class RerunSink:
             self._flush()
         finally:
             self._disconnect()
+
+    def _write(self, events: Events | None) -> None:
+        if events is None:
+            return
+        for kind, table in events.tables.items():
+            for first in range(0, len(table), self._chunk):
+                self._send(kind, table[first : first + self._chunk])
+        self._drawing.write(events)
+        self._metrics.write(events)
+        self._flush()
+
+    def _send(self, kind: Kind, table: Table) -> None:
+        entity = f"{EVENTS}{kind.label}"
+        values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
+        columns = rr.DynamicArchetype.columns(archetype(entity), components=values)
+        self._rec.send_columns(entity, time_columns(table), columns)
 
     def _disconnect(self) -> None:
         try:
@@ -164,5 +186,4 @@ class RerunSink:
 
 def recording_id(manifest: Manifest) -> str:
     """Name a recording: equal for runs that are the same in everything, the clock included."""
-    digest = hashlib.sha256(json.dumps(manifest.to_strings()).encode()).hexdigest()
-    return f"{manifest.scenario.planner}-{digest[:16]}"
+    return f"{manifest.scenario.planner}-{manifest.digest()[:16]}"

@@ -36,15 +36,16 @@ class Thinning:
 
     def worth(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
-        wanted = np.ones(len(places), np.bool_)
         steps = ((places - self._lower) * self._scale).astype(np.int64)
         cells = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
-        if self.count + len(places) > DRAWN_IN_FULL:
-            number = np.arange(self.count, self.count + len(places))
-            first_in_cell = np.zeros(len(places), np.bool_)
-            first_in_cell[np.unique(cells, return_index=True)[1]] = True
-            wanted = (number < DRAWN_IN_FULL) | (first_in_cell & ~self._taken[cells])
-        self._taken[cells] = True
+        begin = min(max(DRAWN_IN_FULL - self.count, 0), len(places))
+        self._taken[cells[:begin]] = True
+        late = cells[begin:]
+        new = np.flatnonzero(~self._taken[late])
+        first_in_cell = new[np.unique(late[new], return_index=True)[1]]
+        wanted = np.arange(len(places)) < begin
+        wanted[begin + first_in_cell] = True
+        self._taken[late] = True
         self.count += len(places)
         return wanted
 
@@ -99,7 +100,7 @@ class Sketch:
 
     def places(self, nodes: NDArray[np.int32]) -> NDArray[np.float32]:
         """Where nodes are, shape (n, dim); NaN, which no viewer draws, where that is not kept."""
-        found = self._places[np.clip(nodes, 0, len(self._places) - 1)]
+        found = self._places.take(nodes, axis=0, mode="clip")
         found[(nodes < 0) | (nodes >= len(self._places))] = np.nan
         return found
 
@@ -110,7 +111,7 @@ class Sketch:
 
     def slots(self, nodes: NDArray[np.int32]) -> NDArray[np.int32]:
         """Slots of nodes, shape (n,); -1 for those that are not drawn."""
-        found = self._slots[np.clip(nodes, 0, len(self._slots) - 1)]
+        found = self._slots.take(nodes, mode="clip")
         found[(nodes < 0) | (nodes >= len(self._slots))] = -1
         return found
 
