@@ -35,6 +35,8 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 [bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
 
 [bold]brrt diff a.mcap b.mcap[/bold] compares two runs, and says where they part
+
+
 [bold]brrt explain run.mcap[/bold] says why it failed, or took long, and what to try
 
 [bold]brrt view run.mcap[/bold] shows the tree as it grows

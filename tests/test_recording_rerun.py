@@ -317,7 +317,7 @@ def test_cut_anywhere(tmp_path: Path) -> None:
     data, saved = path.read_bytes(), []
     for length in [0, 3, 4, 12, 50, *range(100, len(data) - 40, len(data) // 40)]:
         path.write_bytes(data[:length])
-        batches: list[Events] = []
+        batches = list[Events]()
         with pytest.raises(RecordingError) as told:
             batches.extend(read_rerun(path).batches())
         assert str(told.value).startswith(str(path))

@@ -1,0 +1,152 @@
+"""Golden runs: kept as small recordings, and held against what is planned today."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brrt.errors import BrrtError, RecordingError
+from brrt.events import FIELDS, Events, Kind, Table
+from brrt.files import replacing
+from brrt.planners import PLANNERS
+from brrt.recording import McapSink, Memory, Recording, read
+from brrt.run import Run
+from brrt.scenario import Scenario
+from brrt.worlds import GENERATORS
+
+TICK_NS = 1000
+"""Between two events by the logical clock."""
+
+Source = Scenario | Run | Recording | Path | str
+"""A scenario or a run to be made, or one that was recorded: by brrt, or as MCAP by anybody."""
+
+
+def fresh(source: Source) -> Recording:
+    """Make the run, or read it; by the logical clock, so that equal runs give equal files.
+
+    Args:
+        source: What to run; or a recording; or the name of a scenario (.toml) or recording.
+
+    Raises:
+        BrrtError: It is of no use, or its budget is a time, so that no two runs of it are alike.
+    """
+    given: Any = source
+    if isinstance(given, Path | str):
+        path = Path(given)
+        given = Scenario.load(path) if path.suffix == ".toml" else read(path)
+    if isinstance(given, Scenario):
+        _check_budget(given)
+        given = Run(replace(given, clock="logical"))
+    if isinstance(given, Run):
+        given = _made(given)
+    if not isinstance(given, Recording):
+        kinds = "a Scenario, a Run, a Recording or a file"
+        raise BrrtError(f"give {kinds} to compare with, not {given!r}")
+    return _by_logical_clock(given)
+
+
+def _made(run: Run) -> Recording:
+    _check_budget(run.manifest.scenario)
+    log = Memory()
+    result = run.execute([log]).as_dict()
+    if log.batches[0].kinds_in_order()[0] != 0:
+        raise BrrtError("this Run has been made before; give a new one")
+    return Recording(run.manifest, run.problem.world, lambda: iter(log.batches), result)
+
+
+def again(path: Path) -> Source:
+    """Return what makes a golden run anew: its own scenario, in its own world.
+
+    Raises:
+        BrrtError: The file cannot be read, or its planner is not one of brrt's.
+    """
+    kept = read(path)
+    scenario = kept.manifest.scenario
+    if scenario.planner not in PLANNERS:
+        raise BrrtError(
+            f"{path}: planner {scenario.planner} is not brrt's own; give the run to compare with"
+        )
+    if scenario.world.partition(":")[0] in GENERATORS:
+        return scenario
+    return Run(replace(scenario, clock="logical"), world=kept.world)
+
+
+def save(recording: Recording, path: Path) -> None:
+    """Write a recording; the name is that of a whole file, the old one or the new one.
+
+    Raises:
+        RecordingError: It cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
+    with replacing(path) as unfinished, ExitStack() as stack:
+        sink = McapSink(unfinished, recording.manifest, recording.world)
+        stack.callback(sink.close, whole=False)
+        for batch in recording.batches():
+            sink.write(batch)
+        stack.pop_all()
+        sink.close(whole=True)
+
+
+def near(recording: Recording, golden: Recording, tolerance: float) -> Recording:
+    """Return a run with the golden one's numbers wherever its own are close to them.
+
+    Args:
+        recording: The run.
+        golden: What it is held against.
+        tolerance: For a float x of the golden run, an error of tolerance * max(1, |x|) is close.
+    """
+    if tolerance == 0 or recording.manifest.dof != golden.manifest.dof:
+        return recording
+    log, kept = recording.events(), golden.events()
+    tables = {kind: _near(kind, table, kept[kind], tolerance) for kind, table in log.tables.items()}
+    events = Events(log.dof, tables)
+    return replace(recording, batches=lambda: iter([events]))
+
+
+def _near(kind: Kind, table: Table, kept: Table, tolerance: float) -> Table:
+    table, n = table.copy(), min(len(table), len(kept))
+    for field in FIELDS[kind]:
+        ours, theirs = table[field.name][:n], kept[field.name][:n]
+        if field.type == "q[]":
+            for row in range(n):
+                if ours[row].shape == theirs[row].shape:
+                    ours[row] = _snapped(ours[row], theirs[row], tolerance)
+        elif np.issubdtype(ours.dtype, np.floating):
+            ours[...] = _snapped(ours, theirs, tolerance)
+    return table
+
+
+def _snapped(ours: Any, theirs: Any, tolerance: float) -> Any:
+    close = np.isclose(ours, theirs, rtol=0, atol=tolerance * np.maximum(1, np.abs(theirs)))
+    return np.where(close, theirs, ours)
+
+
+def _check_budget(scenario: Scenario) -> None:
+    if scenario.time is not None:
+        raise BrrtError(
+            "a budget of time ends each run elsewhere; give a golden run iterations and no time"
+        )
+
+
+def _by_logical_clock(recording: Recording) -> Recording:
+    """Return a recording whose event n happened at n us."""
+    scenario = recording.manifest.scenario
+    if scenario.clock == "logical":
+        return recording
+    manifest = replace(recording.manifest, scenario=replace(scenario, clock="logical"), epoch_ns=0)
+
+    def batches() -> Iterator[Events]:
+        for batch in recording.batches():
+            tables = {kind: table.copy() for kind, table in batch.tables.items()}
+            for table in tables.values():
+                table["t"] = TICK_NS * table["seq"]
+            yield Events(batch.dof, tables)
+
+    # The figures that the writer found hold times of the real clock.
+    return replace(recording, manifest=manifest, batches=batches, result=None)
