@@ -24,10 +24,11 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from subprocess import PIPE, Popen
-from typing import IO, cast
+from typing import IO, Any, cast
 
 from mcap.reader import make_reader
 
@@ -209,11 +210,33 @@ def spoiled(data: bytes, rng: random.Random) -> tuple[str, bytes]:
     return way, data[:first] + b + data[first + size : second] + a + data[second + size :]
 
 
-def judge_copy(path: Path, original: Path) -> tuple[str, str | None]:
+@dataclass
+class Original:
+    """A recording to be spoiled: its name, its bytes, its events and all else that it says."""
+
+    path: Path
+    data: bytes
+    events: Events
+    head: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, path: Path) -> "Original":
+        """Read it."""
+        events, _ = saved(path)
+        if events is None:
+            raise AssertionError(f"{path} gives nothing")
+        return cls(path, path.read_bytes(), events, head(path))
+
+
+def head(path: Path) -> tuple[Any, ...]:
+    """Return what a recording says of its run but for the events."""
+    recording = read(path)
+    return recording.manifest, recording.world.to_json(), recording.result
+
+
+def judge_copy(path: Path, original: Original) -> tuple[str, str | None]:
     """Read a spoiled copy; say what became of it, and what is wrong with that."""
-    (whole, _), (events, error) = saved(original), saved(path)
-    if whole is None:
-        return "wrong", "the original gives nothing"
+    whole, (events, error) = original.events, saved(path)
     if events is not None:
         if first_difference([whole.until(seq=len(events) - 1)], [events]):
             return "wrong", "other events, and nothing said"
@@ -224,9 +247,7 @@ def judge_copy(path: Path, original: Path) -> tuple[str, str | None]:
             return "wrong", "other times, and nothing said"
     if error is not None:
         return "reported", None
-    a, b = read(path), read(original)
-    same = (a.manifest, a.world.to_json(), a.result) == (b.manifest, b.world.to_json(), b.result)
-    if events is None or len(events) != len(whole) or not same:
+    if events is None or len(events) != len(whole) or head(path) != original.head:
         return "wrong", "less, or another problem or result, and nothing said"
     return "harmless", None
 
@@ -250,11 +271,11 @@ def copies(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
     """Spoil so many copies; return what is wrong with how they read."""
     findings = []
     with tempfile.TemporaryDirectory() as name:
-        sources = originals(Path(name), rng)
+        sources = [Original.of(path) for path in originals(Path(name), rng)]
         for number in range(count):
             source = sources[number % len(sources)]
-            way, data = spoiled(source.read_bytes(), rng)
-            path = Path(name, f"copy{source.suffix}")
+            way, data = spoiled(source.data, rng)
+            path = Path(name, f"copy{source.path.suffix}")
             path.write_bytes(data)
             began = time.perf_counter()
             try:
@@ -268,12 +289,12 @@ def copies(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
             took = time.perf_counter() - began
             if took > PATIENCE_S:
                 wrong = f"{wrong or ''} took {took:.1f} s"
-            figures[f"{source.suffix[1:]}: {outcome}"] += 1
+            figures[f"{path.suffix[1:]}: {outcome}"] += 1
             figures["slowest copy, ms"] = max(figures["slowest copy, ms"], round(1e3 * took))
             if wrong:
-                keep = Path(tempfile.gettempdir(), f"fault-{number}{source.suffix}")
+                keep = Path(tempfile.gettempdir(), f"fault-{number}{path.suffix}")
                 keep.write_bytes(data)
-                findings.append(f"copy {number} ({way} of {source.name}): {wrong}; see {keep}")
+                findings.append(f"copy {number} ({way} of {source.path.name}): {wrong}; see {keep}")
     return findings
 
 
