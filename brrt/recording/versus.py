@@ -20,7 +20,7 @@ def compare(a: Comparable, b: Comparable, *, names: tuple[str, str] | None = Non
     Args:
         a: The first run.
         b: The second run.
-        names: What they are called; by default files are called as they are.
+        names: What they are called; by default as their files are.
 
     Raises:
         RecordingError: A file cannot be read, or is cut or damaged ahead of the first difference.
@@ -36,4 +36,4 @@ def _side(run: Comparable, name: str) -> Side:
         return Side(name, manifest, world, batches)
     if not isinstance(run, Recording):
         name, run = name or str(run), read(run)
-    return Side(name, run.manifest, run.world, run.batches(), run.result, run.counts)
+    return Side(name or run.name, run.manifest, run.world, run.batches(), run.result, run.counts)
