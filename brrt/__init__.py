@@ -15,6 +15,7 @@ from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
 from brrt.replay.checks import Finding, check
 from brrt.replay.diff import Difference, first_difference
+from brrt.replay.explain import Explanation, explain
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
 from brrt.replay.moment import Moment
@@ -32,6 +33,7 @@ __all__ = [
     "Chain",
     "Difference",
     "Events",
+    "Explanation",
     "Finding",
     "Grid",
     "Kind",
@@ -53,6 +55,7 @@ __all__ = [
     "Tree",
     "World",
     "check",
+    "explain",
     "first_difference",
     "forest",
     "make_robot",
