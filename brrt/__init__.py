@@ -8,12 +8,16 @@ metrics = run.execute([log])
 tree = brrt.forest(log.events())[0]
 """
 
+from brrt.again import BranchedRun, RepeatedRun
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
+from brrt.recording.versus import compare
+from brrt.repeat import Again, plan_again
 from brrt.replay.checks import Finding, check
+from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.explain import Explanation, explain
 from brrt.replay.forest import Tree, forest
@@ -29,8 +33,11 @@ __all__ = [
     "PLANNERS",
     "ROBOTS",
     "RRT",
+    "Again",
+    "BranchedRun",
     "BrrtError",
     "Chain",
+    "Comparison",
     "Difference",
     "Events",
     "Explanation",
@@ -48,6 +55,7 @@ __all__ = [
     "Problem",
     "Recording",
     "RecordingError",
+    "RepeatedRun",
     "Robot",
     "Run",
     "Scenario",
@@ -55,10 +63,12 @@ __all__ = [
     "Tree",
     "World",
     "check",
+    "compare",
     "explain",
     "first_difference",
     "forest",
     "make_robot",
     "make_world",
+    "plan_again",
     "read",
 ]

@@ -29,9 +29,10 @@ def test_plan_writes_both_recordings_and_says_how_to_look(brrt: Command) -> None
     assert done.code == 0, done.err
     assert "solved" in done.out
     assert "brrt replay run.mcap" in done.out
-    assert "rerun run.rrd" in done.out
+    assert "brrt view run.rrd" in done.out
     assert Path("run.mcap").stat().st_size > 1000
     assert Path("run.rrd").stat().st_size > 1000
+    assert "brrt view a.mcap" in brrt("plan", "--out", "a.mcap").out
 
 
 def test_replay_prints_what_plan_printed(brrt: Command) -> None:

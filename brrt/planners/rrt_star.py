@@ -1,20 +1,16 @@
 """RRT* (Karaman and Frazzoli 2011), with informed sampling as an option."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from brrt.events import Events
-from brrt.kernels.emit import EventLog
 from brrt.kernels.forest import grown, grown_forest, rooted_forest
 from brrt.planners import _star
 from brrt.planners.bi_rrt import step_length
 from brrt.planners.contract import Contract, Near
-from brrt.planners.drive import Loop, drive
-from brrt.planners.planner import Planner
+from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -25,7 +21,7 @@ looks for parents, and with so few of them a tree improves slowly."""
 
 
 @dataclass(frozen=True, slots=True)
-class StarPlanner(Planner):
+class StarPlanner(TreePlanner):
     """What RRT* has in common, with one tree and with two."""
 
     default_iterations: ClassVar[int] = 20_000
@@ -49,6 +45,10 @@ class StarPlanner(Planner):
         options = self.options(problem)
         near = Near(options.gamma, options.step, problem.dof)
         return Contract(step=options.step, link=options.link or None, near=near)
+
+    def open_ended(self) -> Self:
+        """See `TreePlanner.open_ended`."""
+        return replace(self, stop_at_first=False)
 
     def options(self, problem: Problem) -> _star.Options:
         """Return what the loop needs, with lengths resolved for a problem."""
@@ -75,12 +75,10 @@ class RRTStar(StarPlanner):
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """See `TreePlanner.loop`."""
         options = self.options(problem)._replace(goal_bias=self.goal_bias)
-        return solve(options, problem.start[None], problem, rng, log, stop)
+        return loop_of(options, problem.start[None], problem, stop)
 
 
 def proven_gamma(problem: Problem) -> float:
@@ -95,15 +93,10 @@ def proven_gamma(problem: Problem) -> float:
     return float(1.1 * (2 * (1 + 1 / d) * volume / ball) ** (1 / d))
 
 
-def solve(
-    options: _star.Options,
-    roots: np.ndarray,
-    problem: Problem,
-    rng: np.random.Generator,
-    log: EventLog,
-    stop: Stop,
-) -> Iterator[Events]:
-    """Plan with one tree or two, by their roots, shape (trees, dof); see `Planner.solve`."""
+def loop_of(
+    options: _star.Options, roots: np.ndarray, problem: Problem, stop: Stop
+) -> Loop[_star.Star]:
+    """Make the loop for one tree or two, by their roots, shape (trees, dof)."""
     forest = rooted_forest(roots, len(roots) + 1 + len(roots) * (stop.iterations + 1))
     n = len(forest.parent)
     counts = np.zeros(_star.COUNTS, np.int64)
@@ -132,8 +125,7 @@ def solve(
     star.child[: len(roots)] = -1
     star.sibling[: len(roots)] = -1
     star.linked[: len(roots)] = -1
-    loop = Loop(_star.advance, star, options, _grown, 8, stop.iterations)
-    return drive(loop, problem, rng, log, stop)
+    return Loop(_star.advance, star, options, _grown, 8, stop.iterations)
 
 
 def _grown(star: _star.Star) -> _star.Star:

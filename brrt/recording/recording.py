@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from brrt.events import Events
+from brrt.events import Events, Kind
 from brrt.replay.account import account
 from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
@@ -23,12 +23,16 @@ class Recording:
         world: The world it ran in.
         batches: Call it for the events, in batches, in order.
         result: The figures that the writer found at the end; None if it did not get there.
+        counts: Events of each kind, as the end of the file has them; None if it does not.
+        name: Of the file, without its folder.
     """
 
     manifest: Manifest
     world: World
     batches: Callable[[], Iterator[Events]]
     result: Mapping[str, Any] | None
+    counts: Mapping[Kind, int] | None = None
+    name: str = ""
 
     def events(self) -> Events:
         """Return the whole log at once."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind
+from brrt.events import Events, Kind, Table
 from brrt.kernels.jit import borrowing, kernel
 
 Floats = NDArray[np.float64]
@@ -60,18 +60,21 @@ class Ledger(NamedTuple):
 
 def changes(events: Events, tree: int) -> Changes:
     """Merge the edges and rewires of a tree in the order of the log."""
-    edges, rewires = (table[table["tree"] == tree] for table in _both(events))
+    edges, rewires = (
+        table[table["tree"] == tree] for table in (events[Kind.EDGE], events[Kind.REWIRE])
+    )
+    return merged(edges, rewires, 0)
+
+
+def merged(edges: Table, rewires: Table, first: int) -> Changes:
+    """Merge edges and rewires of one tree; its nodes are numbered on from `first`."""
     seq = np.concatenate([edges["seq"], rewires["seq"]])
     order = np.argsort(seq, kind="stable")
     joins = order < len(edges)
-    node = np.concatenate([np.arange(len(edges)), rewires["node"]])
+    node = np.concatenate([np.arange(first, first + len(edges)), rewires["node"]])
     parent = np.concatenate([edges["parent"], rewires["parent"]]).astype(np.int64)
     stated = np.concatenate([edges["cost"], rewires["cost"]])
     return Changes(seq[order], node[order].astype(np.int64), parent[order], stated[order], joins)
-
-
-def _both(events: Events) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    return events[Kind.EDGE], events[Kind.REWIRE]
 
 
 def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
@@ -125,9 +128,67 @@ def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -
     _fold(
         moments, np.asarray(asked.node, np.int64), answers,
         made.node, made.parent, made.stated, made.joins, np.ascontiguousarray(length, np.float64),
-        parent, links, cost, lengths, parent_cost, before, verdict,
+        parent, links, cost, lengths, parent_cost, before, verdict, _nothing_yet(),
     )  # fmt: skip
     return Ledger(parent, cost, parent_cost, before, verdict, answers)
+
+
+def _nothing_yet() -> Ints:
+    """Return the place of a fold that has not begun."""
+    return np.array([0, 1])
+
+
+class Standing:
+    """A tree that rewires as it stands, brought forward batch by batch, at 48 bytes a node.
+
+    Attributes:
+        nodes: Nodes so far.
+    """
+
+    def __init__(self) -> None:
+        self.nodes = 0
+        self._place = _nothing_yet()
+        self._parent, self._links = np.empty(0, np.int64), np.empty((0, 3), np.int64)
+        self._cost, self._lengths = np.empty(0), np.empty(0)
+
+    @property
+    def parent(self) -> Ints:
+        """Parents, shape (n,)."""
+        return self._parent[: self.nodes]
+
+    @property
+    def cost(self) -> Floats:
+        """Costs-to-come, shape (n,)."""
+        return self._cost[: self.nodes]
+
+    def change(self, made: Changes) -> NDArray[np.uint8]:
+        """Make changes, those that follow the ones so far; return whether each could be made.
+
+        Args:
+            made: The changes; nodes are numbered through.
+        """
+        self._make_room(int(made.joins.sum()))
+        m = len(made.seq)
+        verdict, nothing = np.zeros(m, np.uint8), np.empty(0)
+        _fold(
+            NONE.seq, NONE.node, nothing,
+            made.node, made.parent, made.stated, made.joins, np.full(m, np.nan),
+            self._parent, self._links, self._cost, self._lengths, np.empty(m), np.empty(m),
+            verdict, self._place,
+        )  # fmt: skip
+        return verdict
+
+    def _make_room(self, more: int) -> None:
+        self.nodes += more
+        room = len(self._parent)
+        if self.nodes <= room:
+            return
+        room = max(self.nodes, room + room // 2)
+        for name, blank in (("_parent", -1), ("_links", -1), ("_cost", 0), ("_lengths", 0)):
+            old = getattr(self, name)
+            new = np.full((room, *old.shape[1:]), blank, old.dtype)
+            new[: len(old)] = old
+            setattr(self, name, new)
 
 
 _CHILD, _NEXT, _LAST = range(3)
@@ -203,9 +264,13 @@ def _fold(
     parent_cost: Floats,
     before: Floats,
     verdict: NDArray[np.uint8],
+    place: Ints,
 ) -> None:
-    """See `fold`; a question waits for its number of changes; from `parent` on it writes."""
-    born, question, rising = 0, 0, True
+    """See `fold`; a question waits for its number of changes; from `parent` on it writes.
+
+    The place, where to go on, is how many nodes there are, and whether no edge is below 0.
+    """
+    born, question, rising = place[0], 0, place[1] == 1
     for i in range(len(node)):
         question = _answer(question, i, moments, asked, answers, cost, born)
         v, p = node[i], new_parent[i]
@@ -236,4 +301,5 @@ def _fold(
         while at >= 0:
             cost[at] = cost[parent[at]] + lengths[at]
             at = _below(v, at, parent, links)
+    place[0], place[1] = born, rising
     _answer(question, len(node), moments, asked, answers, cost, born)
