@@ -19,6 +19,7 @@ from brrt.repeat import Again, plan_again
 from brrt.replay.checks import Finding, check
 from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
+from brrt.replay.explain import Explanation, explain
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
 from brrt.replay.moment import Moment
@@ -39,6 +40,7 @@ __all__ = [
     "Comparison",
     "Difference",
     "Events",
+    "Explanation",
     "Finding",
     "Grid",
     "Kind",
@@ -62,6 +64,7 @@ __all__ = [
     "World",
     "check",
     "compare",
+    "explain",
     "first_difference",
     "forest",
     "make_robot",
