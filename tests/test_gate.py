@@ -149,8 +149,8 @@ def test_the_same_pass_at_once() -> None:
 
 def test_lines_fit_the_screen_and_json_is_json() -> None:
     """Also with numbers that are large, zero or missing."""
-    new = made({"solved": [i > 3 for i in range(20)], "cost": [1e100] * 20, "rewires": [0] * 20})
-    old = made({"cost": [1e-100] * 20, "rewires": [0] * 20})
+    new = made({"solved": [i > 3 for i in range(20)], "cost": [1e300] * 20, "rewires": [0] * 20})
+    old = made({"cost": [1e-300] * 20, "rewires": [0] * 20})
     verdict = judge(new, old, alpha=1e-3, name="it", margins={"cost": 9.99, "rewires": 0})
     assert all(len(line) <= 80 for line in verdict.lines())
     assert json.loads(json.dumps(verdict.as_dict(), allow_nan=False))["passed"] is False

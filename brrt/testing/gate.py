@@ -88,7 +88,7 @@ class Verdict:
         rows = [_ROW.format("", "old", "new", "change", "proven", "allowed", "p", "").rstrip()]
         rows += [_row(each, self.seeds) for each in self.figures]
         rows += [
-            f"failed where p <= {share:.2g}: a false alarm once in {1 / self.alpha:,.0f} changes"
+            f"failed where p <= {share:.2g}: a false alarm at most once in {1 / self.alpha:,.0f} changes"
         ]
         for each in self.figures:
             if not each.passed and each.worst is not None:
@@ -108,7 +108,7 @@ class Verdict:
         }  # fmt: skip
 
 
-_ROW = "  {:22}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9} {}"
+_ROW = "  {:20}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8} {}"
 
 
 def gate(
@@ -175,10 +175,12 @@ def _judge(
         return Judged(name, margin, math.nan, math.nan, -math.inf, 1.0, True, None)
     old, new = (np.array([pair[side][name] for pair in pairs], np.float64) for side in (0, 1))
     grown = ranks.log_ratios(old, new)
+    with np.errstate(over="ignore"):
+        proven = float(np.expm1(ranks.at_least(grown, share)))
     p = ranks.signed_rank(ranks.log_ratios(old, new / (1 + margin)))
     return Judged(
         name, margin, float(np.median(old)), float(np.median(new)),
-        math.expm1(ranks.at_least(grown, share)), p, p > share, seeds[int(np.argmax(grown))],
+        proven, p, p > share, seeds[int(np.argmax(grown))],
     )  # fmt: skip
 
 
@@ -257,7 +259,7 @@ def _row(each: Judged, seeds: int) -> str:
 
 
 def _percent(ratio: float) -> str:
-    return f"{100 * ratio:+.3g} %"
+    return f"{100 * ratio:+.3g} %" if ratio < 100 else f"x{1 + ratio:.3g}"
 
 
 def _plain(value: Any) -> Any:
