@@ -12,6 +12,7 @@ from .export import export
 from .lists import planners, robots
 from .plan import plan
 from .plot import plot
+from .recover import recover
 from .replay import replay
 from .verify import verify
 from .view import view
@@ -42,6 +43,8 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
 
+[bold]brrt recover cut.mcap --out whole.mcap[/bold] saves what a killed run left
+
 [bold]brrt planners[/bold] lists what there is to set
 
 Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 interrupted.""",
@@ -55,6 +58,7 @@ app.command()(diff)
 app.command()(explain)
 app.command()(export)
 app.command()(view)
+app.command()(recover)
 app.command()(planners)
 app.command()(robots)
 app.add_typer(worlds, name="worlds")

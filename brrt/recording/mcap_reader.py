@@ -9,7 +9,7 @@ from functools import partial
 from io import BytesIO
 from os import SEEK_END
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import zstandard
@@ -50,7 +50,7 @@ def read_mcap(path: Path) -> Recording:
     """
     texts: Mapping[str, str] | None = None
     with opened(path) as file:
-        for opcode, data in records_of(path, file, check_end=False):
+        for opcode, data in _head_of(path, file):
             if opcode == Opcode.METADATA:
                 metadata = parsed(path, records.Metadata, data)
                 texts = metadata.metadata if metadata.name == RUN else texts
@@ -63,6 +63,13 @@ def read_mcap(path: Path) -> Recording:
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
     raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
+
+
+def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    try:
+        yield from records_of(path, file, check_end=False)
+    except CutError as error:
+        raise CutError(f"{error}, ahead of the first event: there is nothing to save") from None
 
 
 def _result(path: Path) -> Mapping[str, Any] | None:
