@@ -70,6 +70,12 @@ class _Files:
         return folder / (path.name if ".." in inside.parts else inside)
 
 
+def _headline(found: Comparison) -> str:
+    """Say in a few words what differs; pytest's summary has room for no more."""
+    first = found.first
+    return "other settings" if first is None else f"another run from event {first.seq} on"
+
+
 def _fail(kept: Path, told: str) -> NoReturn:
     """Fail the test; the message is kept as well, beside what was kept of the run."""
     __tracebackhide__ = True
@@ -132,7 +138,12 @@ class Golden:
         found = self._compare(path, fresh, tolerance, files.told(kept))
         if not found.equal:
             golden.save(fresh, kept)
-            lines = [*found.lines(), "", f"If that is meant: {_UPDATE}, and commit it."]
+            lines = [
+                _headline(found),
+                *found.lines(),
+                "",
+                f"If that is meant: {_UPDATE}, and commit it.",
+            ]
             _fail(kept, "\n".join(lines))
         return fresh
 

@@ -525,7 +525,8 @@ def test_the_recipe_for_ci(
     failed = pytester.path / "failed"
     told = (pytester.path / "summary.md").read_text()
     assert told == (failed / "report.md").read_text()
-    assert told.startswith("### golden/forest\n```\nA  golden/forest.mcap\n")
+    headline = "another run from event 2 on"
+    assert told.startswith(f"### golden/forest\n```\n{headline}\nA  golden/forest.mcap\n")
     assert "They part at event 2" in told
     assert brrt.read(failed / "golden" / "forest.rrd").manifest.scenario.seed == 8
     assert "failed/report.md" in steps["Comment"]["run"]

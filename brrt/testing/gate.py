@@ -87,9 +87,8 @@ class Verdict:
         share = self.alpha / len(self.figures)
         rows = [_ROW.format("", "old", "new", "change", "proven", "allowed", "p", "").rstrip()]
         rows += [_row(each, self.seeds) for each in self.figures]
-        rows += [
-            f"failed where p <= {share:.2g}: a false alarm at most once in {1 / self.alpha:,.0f} changes"
-        ]
+        often = f"{1 / self.alpha:,.0f} changes"
+        rows += [f"failed where p <= {share:.2g}: a false alarm at most once in {often}"]
         for each in self.figures:
             if not each.passed and each.worst is not None:
                 rows.append(f"look at seed {each.worst}, whose {each.name} grew most")
