@@ -22,6 +22,7 @@ from brrt.repeat import Again, plan_again
 from brrt.replay.checks import Finding, check
 from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
+from brrt.replay.explain import Explanation, explain
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
 from brrt.replay.moment import Moment
@@ -43,6 +44,7 @@ __all__ = [
     "Comparison",
     "Difference",
     "Events",
+    "Explanation",
     "Finding",
     "Grid",
     "Kind",
@@ -67,6 +69,7 @@ __all__ = [
     "World",
     "check",
     "compare",
+    "explain",
     "first_difference",
     "forest",
     "gate",

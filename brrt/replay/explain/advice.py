@@ -14,6 +14,9 @@ MOST = 3
 _ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
 """What grows a second tree from the goal, instead of each planner."""
 
+_ENOUGH = 100
+"""Extensions from which on a run's course means anything."""
+
 _GROWING = 0.05
 """Of what was reached, the part that must have come in the last third of a run that grows."""
 
@@ -91,7 +94,9 @@ def long_step(f: Facts) -> Advice | None:
 def second_tree(f: Facts) -> Advice | None:
     """One tree stopped growing in front of the passage, or came no nearer for half of the run."""
     planner = _ONE_TREE.get(f.scenario.planner)
-    if planner is None or f.approach is None or (f.coverage and f.coverage.late > _SPREADING):
+    if planner is None or f.approach is None or f.accepted + f.failed < _ENOUGH:
+        return None
+    if f.coverage is not None and f.coverage.late > _SPREADING:
         return None
     if _stuck(f):
         why = "no node got through the passage; a tree from the goal meets it from behind"
