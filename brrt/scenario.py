@@ -115,6 +115,8 @@ class Scenario:
         Raises:
             BrrtError: A name is unknown or a value of no use.
         """
+        if not isinstance(values, Mapping):
+            raise BrrtError("a scenario must be a table of names and values")
         names = [f.name for f in fields(cls)]
         for name in values:
             if name not in names:
