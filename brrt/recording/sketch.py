@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from brrt.worlds.world import World
 
-DRAWN_IN_FULL = 50_000
-"""Nodes up to which every edge is drawn."""
+DRAWN_IN_FULL = 100_000
+"""Nodes up to which every edge is drawn; `benchmarks/scrubbing.py` tells what a viewer makes of
+them."""
 
 IN_FULL, STRIDE = 10_000, 16
 """Items of a kind that stay for a moment, as samples do: so many are all drawn, then one of 16."""
