@@ -109,11 +109,11 @@ def second_tree(f: Facts) -> Advice | None:
 
 
 def short_step(f: Facts) -> Advice | None:
-    """The tree is still small because its steps are short, not because most of them fail."""
+    """The tree still spreads, and is small because its steps are short."""
     step, coverage, usual = _step(f), f.coverage, 0.05 * f.extent
     if step is None or coverage is None or f.acceptance is None:
         return None
-    if f.acceptance < 0.1 or coverage.share > 0.5 or step > usual / 5:
+    if f.acceptance < 0.1 or coverage.share > 0.5 or step > usual / 5 or not _grows(f):
         return None
     reached = f"{f.accepted:,} steps of {step:g} reached {coverage.share:.0%} of the free space"
     wide = usual if f.narrow is None else min(usual, max(f.narrow.low, 2 * step))
