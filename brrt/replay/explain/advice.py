@@ -109,14 +109,16 @@ def second_tree(f: Facts) -> Advice | None:
 
 
 def short_step(f: Facts) -> Advice | None:
-    """The tree still spreads, and is small because its steps are short."""
+    """The tree is small because its steps are short, and longer ones fit the passage."""
     step, coverage, usual = _step(f), f.coverage, 0.05 * f.extent
     if step is None or coverage is None or f.acceptance is None:
         return None
-    if f.acceptance < 0.1 or coverage.share > 0.5 or step > usual / 5 or not _grows(f):
+    if f.acceptance < 0.1 or coverage.share > 0.5 or step > usual / 5:
         return None
     reached = f"{f.accepted:,} steps of {step:g} reached {coverage.share:.0%} of the free space"
     wide = usual if f.narrow is None else min(usual, max(f.narrow.low, 2 * step))
+    if _stuck(f) and f.narrow is not None and wide > f.narrow.high:
+        return None
     return _with(f, reached, params={"step": _rounded(wide)})
 
 
