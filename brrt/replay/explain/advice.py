@@ -109,7 +109,7 @@ def second_tree(f: Facts) -> Advice | None:
 
 
 def short_step(f: Facts) -> Advice | None:
-    """The tree is still small because its steps are short, not because most of them fail."""
+    """The tree is small because its steps are short, and longer ones fit the passage."""
     step, coverage, usual = _step(f), f.coverage, 0.05 * f.extent
     if step is None or coverage is None or f.acceptance is None:
         return None
@@ -117,6 +117,8 @@ def short_step(f: Facts) -> Advice | None:
         return None
     reached = f"{f.accepted:,} steps of {step:g} reached {coverage.share:.0%} of the free space"
     wide = usual if f.narrow is None else min(usual, max(f.narrow.low, 2 * step))
+    if _stuck(f) and f.narrow is not None and wide > f.narrow.high:
+        return None
     return _with(f, reached, params={"step": _rounded(wide)})
 
 
