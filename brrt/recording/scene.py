@@ -140,6 +140,8 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
         "settings": ", ".join(f"{name}={value}" for name, value in settings.items()),
         "made by": ", ".join(f"{name} {value}" for name, value in manifest.made_by.items()),
     }
+    for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
+        rows[f"at iteration {branch.iteration:,} of {branch.file}"] = branch.told(after)
     rows = _results(figures) | rows
     table = "".join(f"| {name} | {_cell(value)} |\n" for name, value in rows.items())
     return f"### {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"

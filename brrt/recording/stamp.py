@@ -17,6 +17,10 @@ _BEGIN, _END = "!crc#", "#!"
 BLANK = f"{_BEGIN}QZ~jX^vK%wJ`yH&zP|uF*tB+{_END}"
 """Letters of which no four come together anywhere else, so that compression leaves them alone."""
 
+WRITTEN = f"QjZ~{BLANK}~Xw^"
+"""What is written. The letters on either side are for compression to take: what it finds anew near
+the text, such as zeros and a length, it extends into the text, by the first or the last letters."""
+
 _BLOCK = 1 << 20
 _TAIL = 1 << 22
 """The blank is written last but for the index of chunks, a few dozen bytes for each of them."""
@@ -24,8 +28,8 @@ _TAIL = 1 << 22
 _STAMP = re.compile(f"{_BEGIN}([0-9a-f]{{16}})([0-9a-f]{{8}}){_END}".encode())
 
 
-def stamp(path: Path) -> None:
-    """Fill in the blank of a complete file.
+def stamp(path: Path, crc: int) -> None:
+    """Fill in the blank of a complete file whose CRC-32 is known.
 
     Raises:
         OSError: The file cannot be changed.
@@ -33,7 +37,7 @@ def stamp(path: Path) -> None:
     with path.open("r+b") as file:
         size, at = _find(file, BLANK)
         if at >= 0:
-            filled = f"{_BEGIN}{size:016x}{_crc(file, 0, size):08x}{_END}"
+            filled = f"{_BEGIN}{size:016x}{crc:08x}{_END}"
             file.seek(at)
             file.write(filled.encode())
 
@@ -56,6 +60,11 @@ def is_damaged(path: Path) -> bool:
         behind = at + len(BLANK)
         whole = _crc(file, behind, size, zlib.crc32(BLANK.encode(), before))
         return whole != int(found[2], 16)
+
+
+def blanked(data: bytes) -> bytes:
+    """Return a part of a file as it was before the stamp was filled in."""
+    return _STAMP.sub(BLANK.encode(), data)
 
 
 def _find(file: IO[bytes], text: str) -> tuple[int, int]:
