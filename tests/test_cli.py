@@ -38,8 +38,8 @@ def test_plan_writes_both_recordings_and_says_how_to_look(brrt: Command) -> None
 def test_one_of_a_thing_is_no_plural(brrt: Command) -> None:
     """One iteration, one sample, one motion."""
     told = brrt("plan", "--world", "empty2d", "--planner", "rrt-connect", "--no-record").out
-    for text in ("1 iteration in ", ": 1 sample, ", " 1 link\n", ", 1 motion, "):
-        assert text in told.replace(" " * 3, "").replace(" \n", "\n")
+    for text in (" 1 iteration in ", ": 1 sample, ", " 1 link ", ", 1 motion, "):
+        assert text in told
     assert " nodes, " in told
 
 
