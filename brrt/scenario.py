@@ -280,6 +280,14 @@ class Branch:
     scenario: Scenario
     seed: int | None = None
 
+    def told(self, after: Scenario) -> str:
+        """Say what is otherwise from here on, where another scenario rules."""
+        before, now = ({**s.as_dict(), **s.settings()} for s in (self.scenario, after))
+        names = [n for n in now if n not in ("params", "seed", "start", "goal", "draws")]
+        parts = [f"{n} {now[n]}, was {before[n]}" for n in names if now[n] != before.get(n)]
+        parts += [] if self.seed is None else [f"draws from seed {self.seed}"]
+        return "; ".join(parts) or "all as before"
+
     @classmethod
     def parse(cls, values: Mapping[str, Any]) -> Self:
         """Read what `dataclasses.asdict` made of one.

@@ -71,7 +71,8 @@ def verify(
     planner = recording.manifest.scenario.planner
     saved = Saved(recording, partial=partial, verb="verify them")
     events = Events.concat(recording.manifest.dof, saved)
-    tallies = examine(recording.manifest, recording.world, events, cut=saved.cut)
+    cut = saved.cut or recording.result is None  # as of a file that brrt recover made
+    tallies = examine(recording.manifest, recording.world, events, cut=cut)
     broken = sum(tally.broken for tally in tallies)
     again = _again(recording, saved, tolerance) if rerun else None
     if as_json:
@@ -80,7 +81,7 @@ def verify(
             {
                 "holds": not broken,
                 "planner_known": known,
-                "cut": saved.cut,
+                "cut": cut,
                 "events": len(events),
                 "rules": _json(tallies),
                 **({} if again is None else {"rerun": again.as_dict()}),

@@ -26,6 +26,7 @@ class Background:
         self._sink = sink
         self._queue: queue.Queue[Events | None] = queue.Queue(_BATCHES)
         self._error: BaseException | None = None
+        self._failed = False
         self._thread = threading.Thread(target=self._work, name="brrt recorder", daemon=True)
         self._thread.start()
 
@@ -47,11 +48,11 @@ class Background:
 
     def _work(self) -> None:
         while (events := self._next()) is not None:
-            if self._error is None:
+            if not self._failed:  # a batch behind one that is missing is of no use
                 try:
                     self._sink.write(events)
                 except BaseException as error:  # noqa: BLE001 - raised again on the caller's thread
-                    self._error = error
+                    self._error, self._failed = error, True
 
     def _next(self) -> Events | None:
         try:

@@ -182,4 +182,4 @@ def merged(tables: Iterable[Table], *fields: str) -> Table:
             part[name] = table[name]
         parts.append(part)
     joined = np.concatenate(parts)
-    return joined[np.argsort(joined["seq"], kind="stable")]
+    return joined.take(np.argsort(joined["seq"], kind="stable"))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import zstandard
@@ -46,7 +46,7 @@ def read_mcap(path: Path) -> Recording:
     """
     texts: Mapping[str, str] | None = None
     with opened(path) as file:
-        for opcode, data in records_of(path, file, check_end=False):
+        for opcode, data in _head_of(path, file):
             if opcode == Opcode.METADATA:
                 metadata = parsed(path, records.Metadata, data)
                 texts = metadata.metadata if metadata.name == RUN else texts
@@ -60,6 +60,13 @@ def read_mcap(path: Path) -> Recording:
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
     raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
+
+
+def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    try:
+        yield from records_of(path, file, check_end=False)
+    except CutError as error:
+        raise CutError(f"{error}, ahead of the first event: there is nothing to save") from None
 
 
 @dataclass(slots=True)

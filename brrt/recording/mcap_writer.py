@@ -23,7 +23,8 @@ RUN, RESULT, WORLD = "brrt.run", "brrt.result", "world.json"
 """Names of the metadata and of the attachment."""
 
 _CHUNK_EVENTS = 8000
-_CHUNK_SECONDS = 1.0
+_CHUNK_SECONDS = 0.5
+"""Half of what is promised: the rest is for the writing, on a machine that has more to do."""
 
 
 def channel_of(kind: Kind) -> int:
@@ -54,16 +55,26 @@ class McapSink:
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
         try:
             self._file = Container(self._path, library)
-        except OSError as error:
-            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
-        self._file.declare(*_schemas(manifest.dof), *_channels())
-        with self._failing():
+            self._file.declare(*_schemas(manifest.dof), *_channels())
             self._file.metadata(RUN, manifest.to_strings())
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
+            self._file.flush()
+        except OSError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
 
     def write(self, events: Events) -> None:
         """Take a batch; small ones are gathered into one chunk."""
         self._write_chunk(self._gathering.add(events))
+
+    def annotate(self, name: str, texts: dict[str, str]) -> None:
+        """Keep named texts in the file, behind the events so far.
+
+        Raises:
+            RecordingError: The disk does not take them.
+        """
+        self._write_chunk(self._gathering.take())
+        with self._failing():
+            self._file.metadata(name, texts)
 
     def close(self, *, whole: bool) -> None:
         """Write what is pending, the figures, the index and the footer."""
@@ -89,7 +100,7 @@ class McapSink:
         except OSError as error:
             raise RecordingError(
                 f"cannot go on writing {self._path}: {error.strerror or error}; "
-                f"what was written before can be replayed with --partial"
+                f"what was written before is whole: replay it with --partial, or see brrt recover"
             ) from None
 
     def _write_chunk(self, events: Events | None) -> None:

@@ -7,21 +7,21 @@ from typing import Any
 import rerun as rr
 
 from brrt.errors import RecordingError
-from brrt.events import FIELDS, Events, Kind, Table
+from brrt.events import FIELDS, Events
 from brrt.recording import viewer
-from brrt.recording.columns import time_columns, to_arrow
+from brrt.recording.columns import event_columns, time_columns
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
 from brrt.recording.gathering import Gathering
-from brrt.recording.rrd_outline import END, EVENTS, MANIFEST, WORLD, archetype
+from brrt.recording.rrd_outline import CHECK, END, EVENTS, MANIFEST, OURS, WORLD, archetype
 from brrt.recording.scene import application, blueprint, document
-from brrt.recording.stamp import BLANK, stamp
+from brrt.recording.stamp import WRITTEN, stamp
 from brrt.recording.stream import connect, new_stream
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.9, 0.1
+_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.5, 0.1
 """Events that are written together, and for how long one may wait for that: on its way to a file
 alone, and to somebody who is looking."""
 
@@ -88,6 +88,11 @@ class RerunSink:
         """
         self._write(self._gathering.add(events))
 
+    def annotate(self, name: str, texts: dict[str, str]) -> None:
+        """Keep named texts in the file, behind the events so far."""
+        self._write(self._gathering.take())
+        self._write_texts(f"{OURS}{name.rpartition('.')[2]}", texts)
+
     def close(self, *, whole: bool) -> None:
         """Write how it ended, and let go of file and viewer.
 
@@ -100,7 +105,7 @@ class RerunSink:
             self._write(self._gathering.take())
             self._drawing.close()
             figures = self._metrics.as_dict()
-            end = {"events": str(figures["events"]), "stamp": BLANK}
+            end = {"events": str(figures["events"]), "stamp": WRITTEN}
             if whole:
                 end["result"] = json.dumps(figures)
                 self._document(document(self._manifest, figures))
@@ -114,18 +119,19 @@ class RerunSink:
     def _write(self, events: Events | None) -> None:
         if events is None:
             return
-        for kind, table in events.tables.items():
-            for first in range(0, len(table), self._chunk):
-                self._send(kind, table[first : first + self._chunk])
+        chunks = [
+            (kind, table[first : first + self._chunk])
+            for kind, table in events.tables.items()
+            for first in range(0, len(table), self._chunk)
+        ]
+        # By their first events, so that of a file that is cut little goes for want of a kind.
+        for kind, table in sorted(chunks, key=lambda chunk: int(chunk[1]["seq"][0])):
+            entity = f"{EVENTS}{kind.label}"
+            columns = event_columns(archetype(entity), FIELDS[kind], table)
+            self._rec.send_columns(entity, time_columns(table), columns)
         self._drawing.write(events)
         self._metrics.write(events)
         self._flush()
-
-    def _send(self, kind: Kind, table: Table) -> None:
-        entity = f"{EVENTS}{kind.label}"
-        values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
-        columns = rr.DynamicArchetype.columns(archetype(entity), components=values)
-        self._rec.send_columns(entity, time_columns(table), columns)
 
     def _disconnect(self) -> None:
         try:
@@ -158,7 +164,17 @@ class RerunSink:
         self._rec.log("/run", markdown, static=True)
 
     def _flush(self) -> None:
-        """Hand everything on now: a killed run leaves all but its last batch."""
+        """Hand everything on now: a killed run leaves all but its last batch.
+
+        Behind it comes a checksum of the file so far, since the format has none.
+        """
+        self._hand_on()
+        if self._drain is not None:
+            text = {"bytes": str(self._drain.size), "crc32": str(self._drain.crc)}
+            self._write_texts(CHECK, text)
+            self._hand_on()
+
+    def _hand_on(self) -> None:
         try:
             self._rec.flush()
         except RuntimeError:
@@ -166,7 +182,7 @@ class RerunSink:
                 raise
             # Someone has closed the viewer. The file, which has its own way out, goes on.
         if self._drain is not None:
-            self._drain.check()
+            self._drain.settle()
 
 
 def recording_id(manifest: Manifest) -> str:

@@ -31,16 +31,22 @@ TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
 _EVENTS_AT_ONCE = 1 << 16
 
 
-def read_rerun(path: Path) -> Recording:
+def read_rerun(path: Path, *, in_parts: bool = False) -> Recording:
     """Open a recording that `RerunSink` wrote.
 
     Its batches raise `CutError` behind the last whole event of a file that was cut.
 
+    Args:
+        path: The file.
+        in_parts: Where its checksum is wrong, take what the checksums of its parts say is sound.
+
     Raises:
         RecordingError: The file cannot be read, is damaged, or is no recording of brrt.
     """
-    outline = Outline.of(path)
+    outline = Outline.of(path, in_parts=in_parts)
     if MANIFEST not in outline.texts or WORLD not in outline.texts:
+        if isinstance(outline.stopped, CutError):
+            raise CutError(f"{outline.stopped}, ahead of the first event: there is nothing to save")
         raise outline.stopped or RecordingError(
             f"{path}: a Rerun file, but not a recording of brrt (no {MANIFEST})"
         )
@@ -199,5 +205,5 @@ def _check_end(
         raise CutError(str(outline.stopped), figures)
     if outline.stopped is not None:
         raise outline.stopped
-    if missing:
-        raise CutError(f"{outline.path}: was made of a file that was cut: events are missing")
+    if missing or stated is None:
+        raise CutError(f"{outline.path}: was made of a file that was cut: the end is missing")

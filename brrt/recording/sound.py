@@ -30,6 +30,10 @@ class CutError(RecordingError):
         self.result = result
 
 
+class DamagedError(RecordingError):
+    """The checksum of a whole file is wrong; parts of it may be sound."""
+
+
 def head(path: Path, texts: Mapping[str, str], world_json: str | bytes) -> tuple[Manifest, World]:
     """Return the manifest and the world that a file begins with.
 

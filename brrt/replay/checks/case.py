@@ -130,7 +130,9 @@ class Case:
         goal: Last configuration, shape (dof,).
         lower: Least configuration, shape (dof,).
         upper: Greatest configuration, shape (dof,).
-        contract: What the planner promises.
+        contract: What the planner promises, by the settings that it ended with.
+        stretches: The number of the event that each contract rules from, and the contract: more
+            than one where a run went on from a recorded one with other settings.
         known: Whether the planner is known here, so that there is a contract.
         cut: Whether the log breaks off.
     """
@@ -144,6 +146,7 @@ class Case:
     lower: Floats
     upper: Floats
     contract: Contract
+    stretches: tuple[tuple[int, Contract], ...]
     known: bool
     cut: bool = False
 
@@ -171,13 +174,29 @@ class Case:
         """
         scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
         problem = scenario.make_problem(world)
-        if contract is None and scenario.planner in PLANNERS:
-            contract = scenario.make_planner().contract(problem)
+        known = contract is not None or scenario.planner in PLANNERS
+        stretches: tuple[tuple[int, Contract], ...] = ((0, contract or Contract()),)
+        if contract is None and known:
+            stretches = tuple(
+                (first, ruling.make_planner().contract(problem))
+                for first, ruling in manifest.stretches
+            )
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
             manifest, world, events, problem.robot, problem.start, problem.goal, *bounds,
-            contract or Contract(), contract is not None, cut,
+            stretches[-1][1], stretches, known, cut,
         )  # fmt: skip
+
+    def stretch(self, table: Table) -> NDArray[np.int64]:
+        """Return which of the `stretches` each event belongs to, shape (n,)."""
+        firsts = [first for first, _ in self.stretches]
+        return np.maximum(np.searchsorted(firsts, table["seq"], side="right") - 1, 0)
+
+    def limits(self, table: Table, figure: Callable[[Contract], float | None]) -> Floats:
+        """Return a limit that each event is held to, infinite where there is none, shape (n,)."""
+        found = [figure(contract) for _, contract in self.stretches]
+        each = np.array([np.inf if limit is None else limit for limit in found])
+        return np.asarray(each[self.stretch(table)])
 
     def distance(self, a: Floats, b: Floats) -> Floats:
         """Distances in the robot's metric between rows of configurations."""
