@@ -26,7 +26,7 @@ def compare(
     Args:
         a: The first run.
         b: The second run.
-        names: What they are called; by default as their files are.
+        names: What they are called; by default files are called as they are.
         tolerance: How far apart the events' numbers may be; by default every bit counts. It is
             relative to the greater of the two, and to 1 where both are less.
 
@@ -44,4 +44,4 @@ def _side(run: Comparable, name: str) -> Side:
         return Side(name, manifest, world, batches)
     if not isinstance(run, Recording):
         name, run = name or str(run), read(run)
-    return Side(name or run.name, run.manifest, run.world, run.batches(), run.result, run.counts)
+    return Side(name, run.manifest, run.world, run.batches(), run.result, run.counts)
