@@ -12,7 +12,7 @@ from brrt.planners.contract import Contract
 from brrt.replay.account import choice_name
 from brrt.replay.explain.gather import FAILED, Gather
 from brrt.replay.explain.places import Blocker, Coverage, Gap, Narrow, Places, Spot
-from brrt.replay.history import as_plain
+from brrt.replay.story import as_plain
 from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds.world import World
