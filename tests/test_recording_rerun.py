@@ -156,17 +156,14 @@ def test_columns_are_those_that_rerun_makes(kind: Kind) -> None:
     for ours, its in zip(event_columns(name, FIELDS[kind], table), wanted, strict=True):
         assert ours.component_descriptor() == its.component_descriptor()
         assert ours.as_arrow_array() == its.as_arrow_array()
-    for ours, its in zip(
-        time_columns(table),
-        [
-            rr.TimeColumn("iteration", sequence=table["iteration"]),
-            rr.TimeColumn("event", sequence=table["seq"]),
-            rr.TimeColumn("t", duration=table["t"].astype("m8[ns]")),
-        ],
-        strict=True,
-    ):
-        assert ours.timeline_name() == its.timeline_name()
-        assert ours.as_arrow_array() == its.as_arrow_array()
+    times = [
+        rr.TimeColumn("iteration", sequence=table["iteration"]),
+        rr.TimeColumn("event", sequence=table["seq"]),
+        rr.TimeColumn("t", duration=table["t"].astype("m8[ns]")),
+    ]
+    for mine, stock in zip(time_columns(table), times, strict=True):
+        assert mine.timeline_name() == stock.timeline_name()
+        assert mine.as_arrow_array() == stock.as_arrow_array()
 
 
 def test_stock_command_reads_it(tmp_path: Path) -> None:
