@@ -180,6 +180,8 @@ def facts(manifest: Manifest, world: World, robot: Robot, gather: Gather) -> Fac
     rejects = gather.rejects.rows()
     ends = gather.origins(rejects), np.asarray(rejects["q"])
     connected, way, narrow = places.narrow(start, goal)
+    if figures["solved"] and connected is None:
+        connected, way = True, f"the run found it; {way}"
     return Facts(
         manifest=manifest,
         contract=_contract(manifest, world),
