@@ -156,14 +156,14 @@ def test_columns_are_those_that_rerun_makes(kind: Kind) -> None:
     for ours, its in zip(event_columns(name, FIELDS[kind], table), wanted, strict=True):
         assert ours.component_descriptor() == its.component_descriptor()
         assert ours.as_arrow_array() == its.as_arrow_array()
-    stock = [
+    times = [
         rr.TimeColumn("iteration", sequence=table["iteration"]),
         rr.TimeColumn("event", sequence=table["seq"]),
         rr.TimeColumn("t", duration=table["t"].astype("m8[ns]")),
     ]
-    for column_of_ours, column_of_its in zip(time_columns(table), stock, strict=True):
-        assert column_of_ours.timeline_name() == column_of_its.timeline_name()
-        assert column_of_ours.as_arrow_array() == column_of_its.as_arrow_array()
+    for mine, stock in zip(time_columns(table), times, strict=True):
+        assert mine.timeline_name() == stock.timeline_name()
+        assert mine.as_arrow_array() == stock.as_arrow_array()
 
 
 def test_stock_command_reads_it(tmp_path: Path) -> None:

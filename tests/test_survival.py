@@ -318,7 +318,7 @@ def test_faults() -> None:
     """A few kills at full speed and a few spoiled copies; benchmarks/faults.py has thousands."""
     script = Path(__file__).parents[1] / "benchmarks" / "faults.py"
     done = subprocess.run(
-        [sys.executable, script, "--kills", "2", "--copies", "48"],
+        [sys.executable, script, "--kills", "1", "--copies", "36"],
         capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

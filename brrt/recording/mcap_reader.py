@@ -27,8 +27,9 @@ from brrt.scenario import Manifest
 _ANY, _TIMES = 1 << 20, 256
 """Of what a chunk unpacks to: bytes in any case, and times its size; events come to 15 times."""
 
-_MOST_DECLARED, _MOST_SCHEMA = 1000, 1 << 20
-"""Schemas and channels in a chunk, and bytes of a schema."""
+_DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+_MOST_DECLARED, _MOST_SCHEMA = 100_000, 1 << 20
+"""Schemas and channels in a file, which other tools repeat in each chunk; bytes of a schema."""
 
 _MOST_SEARCHED = 4_000_000
 """Messages that are searched for in chunks without an index: a second or two."""
@@ -83,6 +84,7 @@ class _Decoder:
     manifest: Manifest
     numbering: Numbering = field(default_factory=Numbering)
     searched: int = 0
+    declared: int = 0
     schemas: dict[int, str] = field(default_factory=dict)
     channels: dict[int, _Channel] = field(default_factory=dict)
 
@@ -123,29 +125,32 @@ class _Decoder:
 
     def learn(self, raw: bytes) -> int:
         """Take in the schemas and channels that a chunk begins with; return where they end."""
-        at = declared = 0
-        while at + 9 <= len(raw) and raw[at] in (Opcode.SCHEMA, Opcode.CHANNEL):
-            length = struct.unpack_from("<Q", raw, at + 1)[0]
-            declared += 1
-            if declared > _MOST_DECLARED or length > _MOST_SCHEMA:
-                raise self.damaged("a chunk declares more than any real one")
-            self._declare(raw[at], raw[at + 9 : at + 9 + length])
-            at += 9 + length
+        at = 0
+        while at + 9 <= len(raw) and raw[at] in _DECLARATIONS:
+            at = self._declare(raw, at)
         return at
 
-    def _declare(self, opcode: int, data: bytes) -> None:
+    def _declare(self, raw: bytes, at: int) -> int:
+        """Take in a schema or a channel; return where it ends."""
+        opcode, length = struct.unpack_from("<BQ", raw, at)
+        end: int = at + 9 + length
+        self.declared += 1
+        if self.declared > _MOST_DECLARED or length > _MOST_SCHEMA:
+            raise self.damaged("it declares more than any real file")
+        data = raw[at + 9 : end]
         if opcode == Opcode.SCHEMA:
             schema = parsed(self.path, records.Schema, data)
             self.schemas[schema.id] = schema.data.decode(errors="replace")
-            return
+            return end
         channel = parsed(self.path, records.Channel, data)
         if channel.topic not in LABELS or channel.schema_id not in self.schemas:
-            return
+            return end
         try:
             layout = Layout.parse(self.schemas[channel.schema_id])
         except (BrrtError, ValueError) as error:
             raise self.damaged(f"the schema of {channel.topic}: {error}") from None
         self.channels[channel.id] = _Channel(LABELS[channel.topic], layout)
+        return end
 
     def events(self, chunk: bytes, index: Mapping[int, NDArray[np.uint64]]) -> Events:
         """Decode the messages of a chunk.
@@ -159,28 +164,30 @@ class _Decoder:
         """
         raw = self.unpack(chunk)
         begin = self.learn(raw)
-        tables, known = {}, begin
-        for number, offsets in index.items():
-            channel = self.channels.get(number)
-            if channel is not None and len(offsets):
-                if channel.kind in tables:
-                    raise self.damaged(f"two channels hold events of kind {channel.kind.label}")
-                tables[channel.kind] = self._table(raw, number, channel, offsets)
-                known += self._sizes(raw, channel, offsets)
-        if known < len(raw):
-            # A file that was cut between a chunk and its indexes, or written anew without them.
-            index = self._found(raw, begin)
-            tables = {
-                channel.kind: self._table(raw, number, channel, offsets)
-                for number, offsets in index.items()
-                if (channel := self.channels.get(number)) is not None
-            }
+        tables, size = self._tables(raw, index)
+        if begin + size < len(raw):
+            # A file that was cut between a chunk and its indexes, or written anew by other tools.
+            tables, _ = self._tables(raw, self._found(raw, begin))
         events = Events(self.manifest.dof, dict(sorted(tables.items())))
         try:
             self.numbering.take(events)
         except BrrtError as error:
             raise self.damaged(str(error)) from None
         return events
+
+    def _tables(
+        self, raw: bytes, index: Mapping[int, NDArray[np.uint64]]
+    ) -> tuple[dict[Kind, NDArray[np.void]], int]:
+        """Decode the messages of our channels; return how many bytes they are, too."""
+        tables, size = dict[Kind, NDArray[np.void]](), 0
+        for number, offsets in index.items():
+            channel = self.channels.get(number)
+            if channel is not None and len(offsets):
+                if channel.kind in tables:
+                    raise self.damaged(f"two channels hold events of kind {channel.kind.label}")
+                tables[channel.kind] = self._table(raw, number, channel, offsets)
+                size += self._sizes(raw, channel, offsets)
+        return tables, size
 
     def _sizes(self, raw: bytes, channel: _Channel, offsets: NDArray[np.uint64]) -> int:
         """Bytes of messages, of which `_table` has seen that they are some."""
@@ -192,6 +199,9 @@ class _Decoder:
         """Index the messages of a chunk by going from one to the next."""
         found: dict[int, list[int]] = {}
         while at < len(raw):
+            if raw[at] in _DECLARATIONS and at + 9 <= len(raw):
+                at = self._declare(raw, at)
+                continue
             if at + RECORD_HEAD.itemsize > len(raw) or self.searched > _MOST_SEARCHED:
                 raise self.damaged("a chunk without its index")
             opcode, length, channel = struct.unpack_from("<BQH", raw, at)

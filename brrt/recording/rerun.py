@@ -142,9 +142,9 @@ class RerunSink:
             self._rec = None
             if self._drain is not None:
                 self._drain.close()
-        if self._path is not None and self._path.is_file():
+        if self._drain is not None and self._path is not None and self._path.is_file():
             try:
-                stamp(self._path)
+                stamp(self._path, self._drain.crc)
             except OSError as error:
                 raise RecordingError(f"cannot write {self._path}: {error.strerror}") from None
 

@@ -14,6 +14,9 @@ MOST = 3
 _ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
 """What grows a second tree from the goal, instead of each planner."""
 
+_ENOUGH = 100
+"""Extensions from which on a run's course means anything."""
+
 _GROWING = 0.05
 """Of what was reached, the part that must have come in the last third of a run that grows."""
 
@@ -91,7 +94,9 @@ def long_step(f: Facts) -> Advice | None:
 def second_tree(f: Facts) -> Advice | None:
     """One tree stopped growing in front of the passage, or came no nearer for half of the run."""
     planner = _ONE_TREE.get(f.scenario.planner)
-    if planner is None or f.approach is None or (f.coverage and f.coverage.late > _SPREADING):
+    if planner is None or f.approach is None or f.accepted + f.failed < _ENOUGH:
+        return None
+    if f.coverage is not None and f.coverage.late > _SPREADING:
         return None
     if _stuck(f):
         why = "no node got through the passage; a tree from the goal meets it from behind"
@@ -104,7 +109,7 @@ def second_tree(f: Facts) -> Advice | None:
 
 
 def short_step(f: Facts) -> Advice | None:
-    """The tree is still small because its steps are short, not because most of them fail."""
+    """The tree is small because its steps are short, and longer ones fit the passage."""
     step, coverage, usual = _step(f), f.coverage, 0.05 * f.extent
     if step is None or coverage is None or f.acceptance is None:
         return None
@@ -112,6 +117,8 @@ def short_step(f: Facts) -> Advice | None:
         return None
     reached = f"{f.accepted:,} steps of {step:g} reached {coverage.share:.0%} of the free space"
     wide = usual if f.narrow is None else min(usual, max(f.narrow.low, 2 * step))
+    if _stuck(f) and f.narrow is not None and wide > f.narrow.high:
+        return None
     return _with(f, reached, params={"step": _rounded(wide)})
 
 

@@ -202,7 +202,7 @@ class Places:
             behind = int(passed.sum())
             through = int(self._gather.iterations(tree)[passed][0]) if behind else None
         if not self._gather.trees:
-            behind = int(found.passed(self._gather.cells.q).sum())
+            behind = int(found.passed(self._robot.places(self._gather.cells.q)).sum())
         reason = f"free cells of {found.cell:.3g} lead to the goal"
         place = found.place.tolist()
         return True, reason, Narrow(found.low, found.high, place, parts, behind, through)
