@@ -108,6 +108,8 @@ class RerunSink:
             end = {"events": str(figures["events"]), "stamp": WRITTEN}
             if whole:
                 end["result"] = json.dumps(figures)
+                counts = self._metrics.counts
+                end["counts"] = json.dumps({kind.label: n for kind, n in counts.items()})
                 self._document(document(self._manifest, figures))
             self._write_texts(END, end)
             if self._view:  # the file is to open at its beginning, though the viewer is at the end
