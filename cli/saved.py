@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from .console import note
+from .console import counted, note
 
 if TYPE_CHECKING:
     from brrt.events import Events
@@ -34,7 +34,8 @@ class Saved:
                 last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
                 yield batch
         except CutError as error:
-            saved = f"{events:,} events up to {last / 1e9:.6f} s are whole"
+            verb = "is" if events == 1 else "are"
+            saved = f"{counted(events, 'event')} up to {last / 1e9:.6f} s {verb} whole"
             if not self._partial:
                 raise RecordingError(
                     f"{error}; {saved}: {self._verb} with --partial, or save them with brrt recover"
