@@ -157,6 +157,22 @@ def test_reads_no_further_than_needed() -> None:
     assert len(read_so_far) == 2
 
 
+def test_counts_come_from_the_end_of_the_file(tmp_path: Path) -> None:
+    """Counts of all kinds are read without the events; a cut file has none."""
+    run = live(SCENARIO)
+    path = filed(run, tmp_path / "run.mcap")
+    counts = read(path).counts
+    assert counts is not None
+    assert {kind: count for kind, count in counts.items() if count} == dict(run[2].counts)
+    early = compare(path, live(OTHER))
+    assert early.first is not None
+    assert early.events[0]["path"] == len(run[2][Kind.PATH])
+    for size in (1, 9, 40, 300):
+        path.write_bytes(path.read_bytes()[:-size])
+        assert read(path).counts is None
+        assert read(path).result is None
+
+
 def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
     """Exit codes, text and JSON of the command."""
     a, b = (filed(live(each), tmp_path / f"{i}.mcap") for i, each in enumerate((SCENARIO, OTHER)))

@@ -22,7 +22,8 @@ from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, RecordingError, Run, Scenario, read
 from brrt.events import FIELDS, Stage, table_dtype
-from brrt.recording import CutError, Memory, canvas, fading, rerun, scene, sketch, trees, viewer
+from brrt.recording import CutError, Memory, canvas, rerun, scene, sketch, trees, viewer
+from brrt.recording.columns import event_columns, time_columns, to_arrow
 from brrt.recording.rerun import RerunSink, recording_id
 from brrt.recording.rrd_frames import FRAME
 from brrt.recording.rrd_outline import Outline
@@ -141,6 +142,30 @@ def test_stock_reader_finds_every_field(tmp_path: Path) -> None:
         assert names | {"iteration", "event", "t"} <= set(batches[0].schema.names)
 
 
+@pytest.mark.parametrize("kind", Kind)
+def test_columns_are_those_that_rerun_makes(kind: Kind) -> None:
+    """They only come sooner."""
+    table = np.zeros(3, table_dtype(kind, 2))
+    table["seq"] = table["t"] = [1, 5, 7]
+    for field in FIELDS[kind]:
+        if field.type == "q[]":
+            table[field.name] = [np.ones((n, 2)) for n in (1, 4, 2)]
+    values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
+    name = f"brrt.{kind.label}"
+    wanted = rr.DynamicArchetype.columns(name, components=values)
+    for ours, its in zip(event_columns(name, FIELDS[kind], table), wanted, strict=True):
+        assert ours.component_descriptor() == its.component_descriptor()
+        assert ours.as_arrow_array() == its.as_arrow_array()
+    times = [
+        rr.TimeColumn("iteration", sequence=table["iteration"]),
+        rr.TimeColumn("event", sequence=table["seq"]),
+        rr.TimeColumn("t", duration=table["t"].astype("m8[ns]")),
+    ]
+    for mine, stock in zip(time_columns(table), times, strict=True):
+        assert mine.timeline_name() == stock.timeline_name()
+        assert mine.as_arrow_array() == stock.as_arrow_array()
+
+
 def test_stock_command_reads_it(tmp_path: Path) -> None:
     """`rerun rrd stats` reads the whole file."""
     write(tmp_path / "run.rrd", SCENARIOS["2d"])
@@ -238,7 +263,7 @@ def test_long_runs_are_thinned_out(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(sketch, "DRAWN_IN_FULL", 100)
     monkeypatch.setattr(sketch, "_CELLS", 64)
     monkeypatch.setattr(sketch, "_KEPT_NODES", 120)
-    monkeypatch.setattr(fading, "_IN_FULL", 50)
+    monkeypatch.setattr(sketch, "IN_FULL", 50)
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["2d"])
     drawn = sum(map(len, column(path, "/world/tree/start", ":strips")))

@@ -1,7 +1,7 @@
 """Events as Arrow columns, the way Rerun takes them; `rrd_reader` undoes that."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow  # noqa: ICN001 - it gets that name below
@@ -13,13 +13,52 @@ from brrt.events import Field, Table
 pa: Any = pyarrow  # mypy knows none of its names
 
 
-def time_columns(rows: Table) -> list[rr.TimeColumn]:
+class Column(NamedTuple):
+    """A column of times or of components, as `send_columns` takes either.
+
+    Rerun's own classes look at all that they are given: that takes longer than to send it.
+
+    Attributes:
+        name: The timeline, or the component's descriptor.
+        values: An Arrow array with one value a row, of components one list.
+    """
+
+    name: Any
+    values: Any
+
+    def timeline_name(self) -> str:
+        """Return the timeline."""
+        return str(self.name)
+
+    def component_descriptor(self) -> Any:
+        """Return which component it is."""
+        return self.name
+
+    def as_arrow_array(self) -> Any:
+        """Return the values."""
+        return self.values
+
+
+def time_columns(rows: Table) -> list[Column]:
     """Return the timelines of events, exact to the nanosecond."""
+    iteration, seq, t = (np.ascontiguousarray(rows[name]) for name in ("iteration", "seq", "t"))
     return [
-        rr.TimeColumn("iteration", sequence=np.ascontiguousarray(rows["iteration"])),
-        rr.TimeColumn("event", sequence=np.ascontiguousarray(rows["seq"])),
-        rr.TimeColumn("t", duration=rows["t"].astype("m8[ns]")),
+        Column("iteration", pa.array(iteration)),
+        Column("event", pa.array(seq)),
+        Column("t", pa.array(t.view("m8[ns]"))),
     ]
+
+
+def event_columns(archetype: str, fields: Iterable[Field], table: Table) -> list[Column]:
+    """Return the fields of events, one component each."""
+    offsets, columns = pa.array(np.arange(len(table) + 1, dtype=np.int32)), []
+    for field in fields:
+        values = to_arrow(field, table[field.name])
+        if field.type != "q[]":  # whose values are lists, one a row, as they come
+            values = pa.ListArray.from_arrays(offsets, values)
+        name = rr.ComponentDescriptor(f"{archetype}:{field.name}", archetype=archetype)
+        columns.append(Column(name, values))
+    return columns
 
 
 def to_arrow(field: Field, values: NDArray[Any]) -> Any:

@@ -6,12 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Table
-from brrt.recording import scene
+from brrt.recording import scene, sketch
 from brrt.recording.canvas import Canvas
-from brrt.recording.sketch import Sketch
-
-_IN_FULL, _STRIDE = 10_000, 16
-"""Items of a kind that are all drawn; then one of so many."""
+from brrt.recording.sketch import Sketch, thinned
 
 _ROW = 16
 """Items in a row; they appear and vanish by rows."""
@@ -38,9 +35,10 @@ class Fading:
 
     def samples(self, table: Table) -> None:
         """Draw samples."""
+        sources = np.ascontiguousarray(table["source"])
         for source in Source:
             name = source.name.lower()
-            rows = table[self._shown(table, table["source"] == source, f"{name} samples")]
+            rows = table.take(self._shown(table, sources == source, f"{name} samples"))
             if len(rows):
                 points = self._canvas.points.columns(positions=self._canvas.places(rows["q"]))
                 self._canvas.send(f"/world/samples/{name}", rows, _even_rows(len(rows)), points)
@@ -49,17 +47,17 @@ class Fading:
         """Draw from where to where extensions were tried in vain."""
         for reason in Reason:
             name = reason.name.lower()
-            rows = table[self._shown(table, table["reason"] == reason, f"{name} rejections")]
+            rows = table.take(self._shown(table, table["reason"] == reason, f"{name} rejections"))
             if len(rows):
                 self._send_lines(f"rejected/{name}", rows, self._attempts(rows))
 
     def rewired(self, tree: int, table: Table) -> None:
         """Highlight the new edges of a tree."""
-        name, sketch = scene.tree_style(tree)[0], self._sketches[tree]
+        name, nodes = scene.tree_style(tree)[0], self._sketches[tree]
         every = np.ones(len(table), np.bool_)
-        rows = table[self._shown(table, every, f"rewired edges of the {name} tree")]
+        rows = table.take(self._shown(table, every, f"rewired edges of the {name} tree"))
         if len(rows):
-            ends = sketch.places(rows["parent"]), sketch.places(rows["node"])
+            ends = nodes.places(rows["parent"]), nodes.places(rows["node"])
             lines = np.stack(ends, axis=1).reshape(-1, self._canvas.dim)
             self._send_lines(f"rewired/{name}", rows, lines)
 
@@ -71,9 +69,9 @@ class Fading:
         """Return where each extension left from and wanted to go, shape (2 n, dim)."""
         dim = self._canvas.dim
         ends = np.full((len(rejects), 2, dim), np.nan, np.float32)
-        for number, sketch in self._sketches.items():
+        for number, nodes in self._sketches.items():
             mine = rejects["tree"] == number
-            ends[mine, 0] = sketch.places(rejects["node"][mine])
+            ends[mine, 0] = nodes.places(rejects["node"][mine])
         ends[:, 1] = self._canvas.places(rejects["q"])
         return ends.reshape(-1, dim)
 
@@ -82,12 +80,10 @@ class Fading:
         which = np.flatnonzero(mine)
         first = self._seen.get(what, 0)
         self._seen[what] = end = first + len(which)
-        if first <= _IN_FULL < end:
-            text = f"{what}: beyond {_IN_FULL:,} one in {_STRIDE} is drawn"
+        if first <= sketch.IN_FULL < end:
+            text = f"{what}: beyond {sketch.IN_FULL:,} one in {sketch.STRIDE} is drawn"
             self._canvas.tell(table[which[-1]], text)
-        number = np.arange(first, end)
-        shown = (number < _IN_FULL) | (number % _STRIDE == 0)
-        return np.asarray(which[shown])
+        return np.asarray(which[thinned(first, len(which))])
 
 
 def _even_rows(count: int) -> NDArray[np.int64]:

@@ -1,13 +1,10 @@
 """Events out of MCAP: record by record from the front, so that a cut file gives what it has."""
 
-import json
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from io import BytesIO
-from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,8 +17,8 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, table_dtype
 from brrt.recording.cdr import MESSAGE, RECORD_HEAD, Layout
-from brrt.recording.container import MAGIC
-from brrt.recording.mcap_records import FOOTER, opened, parsed, records_of
+from brrt.recording.mcap_end import LABELS, ending, figures_of
+from brrt.recording.mcap_records import opened, parsed, records_of
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
 from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head
@@ -38,7 +35,6 @@ _MOST_SEARCHED = 4_000_000
 """Messages that are searched for in chunks without an index: a second or two."""
 
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
-_LABELS = {f"/brrt/{kind.label}": kind for kind in Kind}
 
 
 def read_mcap(path: Path) -> Recording:
@@ -60,7 +56,8 @@ def read_mcap(path: Path) -> Recording:
                 if attachment.name == WORLD:
                     manifest, world = head(path, texts, attachment.data)
                     batches = partial(_batches, path, manifest)
-                    return Recording(manifest, world, batches, _result(path))
+                    result, counts = ending(path)
+                    return Recording(manifest, world, batches, result, counts)
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
     raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
@@ -71,36 +68,6 @@ def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
         yield from records_of(path, file, check_end=False)
     except CutError as error:
         raise CutError(f"{error}, ahead of the first event: there is nothing to save") from None
-
-
-def _result(path: Path) -> Mapping[str, Any] | None:
-    """Look up the figures at the end of the file; None where it has no whole end."""
-    with path.open("rb") as file:
-        try:
-            size = file.seek(-FOOTER - len(MAGIC), SEEK_END)
-            summary = parsed(path, records.Footer, file.read(FOOTER)[9:]).summary_start
-            if not 0 < size - summary <= MOST_BYTES:
-                return None
-            file.seek(summary)
-            for opcode, data in records_of(
-                path, BytesIO(file.read(size - summary)), check_end=False
-            ):
-                if opcode == Opcode.METADATA_INDEX:
-                    index = parsed(path, records.MetadataIndex, data)
-                    if index.name == RESULT and index.length <= MOST_BYTES:
-                        file.seek(index.offset)
-                        return _figures(path, file.read(index.length)[9:])
-        except (OSError, OverflowError, RecordingError):
-            return None  # a cut file fails in many ways; its events are still good
-    return None
-
-
-def _figures(path: Path, data: bytes) -> Mapping[str, Any]:
-    texts = parsed(path, records.Metadata, data).metadata
-    try:
-        return {name: json.loads(text) for name, text in texts.items()}
-    except (ValueError, RecursionError):
-        raise RecordingError(f"{path}: damaged: the figures are not JSON") from None
 
 
 @dataclass(slots=True)
@@ -176,13 +143,13 @@ class _Decoder:
             self.schemas[schema.id] = schema.data.decode(errors="replace")
             return end
         channel = parsed(self.path, records.Channel, data)
-        if channel.topic not in _LABELS or channel.schema_id not in self.schemas:
+        if channel.topic not in LABELS or channel.schema_id not in self.schemas:
             return end
         try:
             layout = Layout.parse(self.schemas[channel.schema_id])
         except (BrrtError, ValueError) as error:
             raise self.damaged(f"the schema of {channel.topic}: {error}") from None
-        self.channels[channel.id] = _Channel(_LABELS[channel.topic], layout)
+        self.channels[channel.id] = _Channel(LABELS[channel.topic], layout)
         return end
 
     def events(self, chunk: bytes, index: Mapping[int, NDArray[np.uint64]]) -> Events:
@@ -308,7 +275,7 @@ def _batches(path: Path, manifest: Manifest) -> Iterator[Events]:
                     raise decoder.damaged("a message outside of a chunk, as brrt writes none")
                 elif opcode == Opcode.METADATA:
                     metadata = parsed(path, records.Metadata, data)
-                    figures = _figures(path, data) if metadata.name == RESULT else figures
+                    figures = figures_of(path, data) if metadata.name == RESULT else figures
         except CutError as error:
             if chunk is not None:
                 yield decoder.events(chunk, index)

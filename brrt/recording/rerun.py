@@ -7,9 +7,9 @@ from typing import Any
 import rerun as rr
 
 from brrt.errors import RecordingError
-from brrt.events import FIELDS, Events, Kind, Table
+from brrt.events import FIELDS, Events
 from brrt.recording import viewer
-from brrt.recording.columns import time_columns, to_arrow
+from brrt.recording.columns import event_columns, time_columns
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
 from brrt.recording.gathering import Gathering
@@ -119,18 +119,19 @@ class RerunSink:
     def _write(self, events: Events | None) -> None:
         if events is None:
             return
-        for kind, table in events.tables.items():
-            for first in range(0, len(table), self._chunk):
-                self._send(kind, table[first : first + self._chunk])
+        chunks = [
+            (kind, table[first : first + self._chunk])
+            for kind, table in events.tables.items()
+            for first in range(0, len(table), self._chunk)
+        ]
+        # By their first events, so that of a file that is cut little goes for want of a kind.
+        for kind, table in sorted(chunks, key=lambda chunk: int(chunk[1]["seq"][0])):
+            entity = f"{EVENTS}{kind.label}"
+            columns = event_columns(archetype(entity), FIELDS[kind], table)
+            self._rec.send_columns(entity, time_columns(table), columns)
         self._drawing.write(events)
         self._metrics.write(events)
         self._flush()
-
-    def _send(self, kind: Kind, table: Table) -> None:
-        entity = f"{EVENTS}{kind.label}"
-        values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
-        columns = rr.DynamicArchetype.columns(archetype(entity), components=values)
-        self._rec.send_columns(entity, time_columns(table), columns)
 
     def _disconnect(self) -> None:
         try:
@@ -139,9 +140,9 @@ class RerunSink:
             self._rec = None
             if self._drain is not None:
                 self._drain.close()
-        if self._path is not None and self._path.is_file():
+        if self._drain is not None and self._path is not None and self._path.is_file():
             try:
-                stamp(self._path)
+                stamp(self._path, self._drain.crc)
             except OSError as error:
                 raise RecordingError(f"cannot write {self._path}: {error.strerror}") from None
 

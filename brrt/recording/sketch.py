@@ -1,12 +1,18 @@
 """What a drawing knows of nodes or cells: where they are, and which of them are worth drawing."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.worlds.world import World
 
-DRAWN_IN_FULL = 50_000
-"""Nodes up to which every edge is drawn."""
+DRAWN_IN_FULL = 100_000
+"""Nodes up to which every edge is drawn; `benchmarks/scrubbing.py` tells what a viewer makes of
+them."""
+
+IN_FULL, STRIDE = 10_000, 16
+"""Items of a kind that stay for a moment, as samples do: so many are all drawn, then one of 16."""
 
 _CELLS = 1 << 16
 """Cells of the grid over the world that thins out what comes after: a cell then takes one edge. So
@@ -17,28 +23,39 @@ _KEPT_NODES = 1 << 19
 drawn."""
 
 
+def thinned(first: int, count: int) -> NDArray[np.int64]:
+    """Return which of some items that stay for a moment are drawn, of which some came before."""
+    end, few = first + count, max(first, IN_FULL)
+    number = np.arange(first, min(end, IN_FULL)), np.arange(few + -few % STRIDE, end, STRIDE)
+    return np.concatenate(number) - first
+
+
 class Thinning:
     """Takes everything up to a number, and then what reaches new places.
 
     Args:
         world: Where these are.
+        full: The number; None takes `DRAWN_IN_FULL`.
+        cells: Of the grid over the world, about; None takes `_CELLS`.
 
     Attributes:
         count: Items that have come.
+        full: As given.
     """
 
-    def __init__(self, world: World) -> None:
-        self.count = 0
-        side = int(_CELLS ** (1 / world.dim))
-        self._lower, self._scale = world.lower, side / (world.upper - world.lower)
+    def __init__(self, world: World, full: int | None = None, cells: int | None = None) -> None:
+        self.count, self.full = 0, DRAWN_IN_FULL if full is None else full
+        side = int((_CELLS if cells is None else cells) ** (1 / world.dim) + 1e-9)
+        self._lower = world.lower.astype(np.float32)
+        self._scale = (side / (world.upper - world.lower)).astype(np.float32)
         self._grid = (side,) * world.dim
         self._taken = np.zeros(side**world.dim, np.bool_)
 
     def worth(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
-        steps = ((places - self._lower) * self._scale).astype(np.int64)
+        steps = ((places - self._lower) * self._scale).astype(np.intp)
         cells = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
-        begin = min(max(DRAWN_IN_FULL - self.count, 0), len(places))
+        begin = min(max(self.full - self.count, 0), len(places))
         self._taken[cells[:begin]] = True
         late = cells[begin:]
         new = np.flatnonzero(~self._taken[late])
@@ -51,7 +68,7 @@ class Thinning:
 
     def begins_within(self, count: int) -> bool:
         """Whether it first left something out among the last so many items."""
-        return self.count - count <= DRAWN_IN_FULL < self.count
+        return self.count - count <= self.full < self.count
 
 
 class Sketch:
@@ -59,14 +76,15 @@ class Sketch:
 
     Args:
         world: Where they are.
+        thinning: What decides which of them are worth drawing.
 
     Attributes:
         drawn: Nodes that were worth drawing; each has a slot, numbered from 0.
-        thinning: What decides about that.
+        thinning: As given.
     """
 
-    def __init__(self, world: World) -> None:
-        self.drawn, self.thinning = 0, Thinning(world)
+    def __init__(self, world: World, thinning: Thinning | None = None) -> None:
+        self.drawn, self.thinning = 0, thinning or Thinning(world)
         self._places = np.full((1024, world.dim), np.nan, np.float32)
         self._slots = np.full(1024, -1, np.int32)
 
@@ -90,10 +108,11 @@ class Sketch:
         """
         which = np.flatnonzero(wanted & self.thinning.worth(places))
         self._make_room(nodes)
-        kept = (nodes >= 0) & (nodes < _KEPT_NODES)
-        self._places[nodes[kept]] = places[kept]
         slots = np.full(len(nodes), -1, np.int32)
         slots[which] = np.arange(self.drawn, self.drawn + len(which))
+        kept: Any = (nodes >= 0) & (nodes < _KEPT_NODES)
+        kept = slice(None) if kept.all() else kept  # which spares copies
+        self._places[nodes[kept]] = places[kept]
         self._slots[nodes[kept]] = slots[kept]
         self.drawn += len(which)
         return which
@@ -118,6 +137,7 @@ class Sketch:
     def _make_room(self, nodes: NDArray[np.int32]) -> None:
         need, have = min(int(nodes.max(initial=-1)) + 1, _KEPT_NODES), len(self._places)
         if need > have:
-            room = (0, min(max(need, 2 * have), _KEPT_NODES) - have)
-            self._places = np.pad(self._places, (room, (0, 0)), constant_values=np.nan)
-            self._slots = np.pad(self._slots, room, constant_values=-1)
+            room = min(max(need, 2 * have), _KEPT_NODES) - have
+            places = np.full((room, self._places.shape[1]), np.nan, np.float32)
+            self._places = np.concatenate([self._places, places])
+            self._slots = np.concatenate([self._slots, np.full(room, -1, np.int32)])

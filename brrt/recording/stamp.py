@@ -28,8 +28,8 @@ _TAIL = 1 << 22
 _STAMP = re.compile(f"{_BEGIN}([0-9a-f]{{16}})([0-9a-f]{{8}}){_END}".encode())
 
 
-def stamp(path: Path) -> None:
-    """Fill in the blank of a complete file.
+def stamp(path: Path, crc: int) -> None:
+    """Fill in the blank of a complete file whose CRC-32 is known.
 
     Raises:
         OSError: The file cannot be changed.
@@ -37,7 +37,7 @@ def stamp(path: Path) -> None:
     with path.open("r+b") as file:
         size, at = _find(file, BLANK)
         if at >= 0:
-            filled = f"{_BEGIN}{size:016x}{_crc(file, 0, size):08x}{_END}"
+            filled = f"{_BEGIN}{size:016x}{crc:08x}{_END}"
             file.seek(at)
             file.write(filled.encode())
 

@@ -11,10 +11,7 @@ from brrt.recording.canvas import Canvas, growing_rows, merged, moments
 from brrt.recording.fading import Fading
 from brrt.recording.pages import Pages
 from brrt.recording.paths import draw_bodies
-from brrt.recording.sketch import DRAWN_IN_FULL, Sketch
-
-_LINKS_IN_FULL, _LINK_STRIDE = 10_000, 16
-"""Links that are all drawn; then one of so many."""
+from brrt.recording.sketch import DRAWN_IN_FULL, Sketch, thinned
 
 
 class Trees:
@@ -35,7 +32,7 @@ class Trees:
     def write(self, events: Events) -> None:
         """Draw a batch."""
         edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
-        for number in np.unique(edges["tree"]).tolist():
+        for number in np.flatnonzero(np.bincount(edges["tree"])).tolist():
             if number not in self._trees:
                 self._sketches[number] = Sketch(self._canvas.world)
                 self._trees[number] = _Tree(self._canvas, number, self._sketches[number])
@@ -54,9 +51,8 @@ class Trees:
     def _draw_links(self, table: Table) -> None:
         if not len(table) or not {0, 1} <= self._sketches.keys():
             return
-        number = np.arange(self._links, self._links + len(table))
+        rows = table[thinned(self._links, len(table))]
         self._links += len(table)
-        rows = table[(number < _LINKS_IN_FULL) | (number % _LINK_STRIDE == 0)]
         if len(rows):
             places = self._sketches[0].places(rows["node"]), self._sketches[1].places(rows["other"])
             lines = np.stack(places, axis=1).reshape(-1, self._canvas.dim)
@@ -91,7 +87,7 @@ class _Tree:
             if drawn.any():
                 which = np.flatnonzero(slots >= 0)
                 lines = self._lines(changes, which)
-                self._pages.change(changes[which], slots[which], lines)
+                self._pages.change(changes.take(which), slots[which], lines)
         elif len(which):
             lines = self._lines(edges, which)
             ends = growing_rows(self._sketch.drawn - len(which), len(which))
@@ -156,4 +152,4 @@ class _Tree:
 
 def _of_tree(table: Table, number: int) -> Table:
     mine = table["tree"] == number
-    return table if mine.all() else table[mine]
+    return table if mine.all() else table.take(np.flatnonzero(mine))  # a mask takes longer

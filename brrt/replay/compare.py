@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from brrt.events import Events, Kind
-from brrt.replay.diff import Difference, first_difference
+from brrt.replay.diff import Deviation, Difference, first_difference
 from brrt.replay.metrics import Metrics
 from brrt.replay.told import Row, settings_of, versions_of
 from brrt.scenario import Manifest
@@ -89,10 +89,10 @@ class Comparison:
         return as_dict(self)
 
 
-def compare_sides(a: Side, b: Side) -> Comparison:
+def compare_sides(a: Side, b: Side, tolerance: float = 0.0) -> Comparison:
     """Compare two runs; their events are read up to the first difference, and no further."""
     readers = _Reader(a), _Reader(b)
-    first = first_difference(*readers)
+    first = first_difference(*readers, Deviation(allowed=tolerance))
     return Comparison(
         (a.name, b.name),
         tuple(settings_of(a.manifest, a.world, b.manifest, b.world)),

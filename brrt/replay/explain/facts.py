@@ -251,7 +251,7 @@ def _approach(
     if near is None:
         return None
     hit = places.in_the_way(np.array(near.q), goal) if near.far > 0 else None
-    far, since = float(robot.distance(start, goal)), 1 - near.iteration / max(last, 1)
+    far, since = float(robot.distance(start, goal)), (last - near.iteration) / max(last, 1)
     return Approach(near.far, far, near.q, near.node, near.iteration, since, hit)
 
 
