@@ -130,7 +130,7 @@ def _possible(kind: Kind, table: Table, count: int) -> None:
         elif field.type == "q[]":
             wrong = np.array([not (len(rows) and _finite(rows).all()) for rows in values], np.bool_)
         elif field.type == "q":
-            wrong = ~_finite(values).all(axis=1)
+            wrong = np.asarray(~_finite(values).all(axis=1))
         elif field.type == "float64":
             wrong = ~_finite(values)
             if field.name == "h":  # where there is no way out
