@@ -10,7 +10,7 @@ from brrt.events import Events
 from brrt.kernels.emit import EventLog
 from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
 from brrt.planners import _bi_rrt
-from brrt.planners.contract import Contract
+from brrt.planners.contract import Contract, Draws, Growth
 from brrt.planners.drive import Loop, drive
 from brrt.planners.planner import Planner
 from brrt.planners.stop import Stop
@@ -50,7 +50,14 @@ class BiRRT(Planner):
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
         step = step_length(self.step, problem)
-        return Contract(step=step, link=step)
+        growth = Growth(
+            turn=self.turn,
+            connects=self.grow == "connect",
+            links=self.link,
+            always_links=self.always_link,
+        )
+        draws = Draws(coin=0.5 if self.turn == "coin" else 0.0)
+        return Contract(step=step, link=step, draws=draws, growth=growth, stops=True)
 
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop

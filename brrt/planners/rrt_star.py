@@ -12,7 +12,7 @@ from brrt.kernels.emit import EventLog
 from brrt.kernels.forest import grown, grown_forest, rooted_forest
 from brrt.planners import _star
 from brrt.planners.bi_rrt import step_length
-from brrt.planners.contract import Contract, Near
+from brrt.planners.contract import Contract, Draws, Growth, Near
 from brrt.planners.drive import Loop, drive
 from brrt.planners.planner import Planner
 from brrt.planners.stop import Stop
@@ -47,8 +47,17 @@ class StarPlanner(Planner):
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
         options = self.options(problem)
-        near = Near(options.gamma, options.step, problem.dof)
-        return Contract(step=options.step, link=options.link or None, near=near)
+        return Contract(
+            step=options.step,
+            link=options.link or None,
+            near=Near(options.gamma, options.step, problem.dof),
+            draws=Draws(options.goal_bias, not options.link, informed=options.informed),
+            growth=Growth(
+                turn="alternate" if options.link else None,
+                links="extend" if options.link else None,
+            ),
+            stops=options.stop_at_first,
+        )
 
     def options(self, problem: Problem) -> _star.Options:
         """Return what the loop needs, with lengths resolved for a problem."""
@@ -75,12 +84,15 @@ class RRTStar(StarPlanner):
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
 
+    def options(self, problem: Problem) -> _star.Options:
+        """See `StarPlanner.options`."""
+        return StarPlanner.options(self, problem)._replace(goal_bias=self.goal_bias)
+
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
-        options = self.options(problem)._replace(goal_bias=self.goal_bias)
-        return solve(options, problem.start[None], problem, rng, log, stop)
+        return solve(self.options(problem), problem.start[None], problem, rng, log, stop)
 
 
 def proven_gamma(problem: Problem) -> float:

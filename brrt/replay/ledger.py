@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind
+from brrt.events import Events, Kind, Table
 from brrt.kernels.jit import borrowing, kernel
 
 Floats = NDArray[np.float64]
@@ -14,6 +14,9 @@ Ints = NDArray[np.int64]
 
 Distance = Callable[[Floats, Floats], Floats]
 """A robot's metric: distances between rows of configurations, shapes (m, dof) to (m,)."""
+
+_AT_ONCE = 1 << 18
+"""Edges that are measured at once."""
 
 SOUND, NO_PARENT, NO_NODE, CIRCLE = range(4)
 """Whether a change could be made: all is well, the new parent does not exist (yet), the rewired
@@ -60,7 +63,10 @@ class Ledger(NamedTuple):
 
 def changes(events: Events, tree: int) -> Changes:
     """Merge the edges and rewires of a tree in the order of the log."""
-    edges, rewires = (table[table["tree"] == tree] for table in _both(events))
+    edges, rewires = (of_tree(events[kind], tree) for kind in (Kind.EDGE, Kind.REWIRE))
+    if not len(rewires):
+        node, joins = np.arange(len(edges)), np.ones(len(edges), bool)
+        return Changes(edges["seq"], node, edges["parent"], edges["cost"], joins)
     seq = np.concatenate([edges["seq"], rewires["seq"]])
     order = np.argsort(seq, kind="stable")
     joins = order < len(edges)
@@ -70,8 +76,10 @@ def changes(events: Events, tree: int) -> Changes:
     return Changes(seq[order], node[order].astype(np.int64), parent[order], stated[order], joins)
 
 
-def _both(events: Events) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    return events[Kind.EDGE], events[Kind.REWIRE]
+def of_tree(table: Table, tree: int) -> Table:
+    """Return the rows of one tree; where they are all, the table itself and no copy."""
+    mine = table["tree"] == tree
+    return table if mine.all() else table[mine]
 
 
 def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
@@ -83,8 +91,11 @@ def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
         distance: The robot's metric.
     """
     n, length = len(q), np.full(len(made.seq), np.nan)
-    there = (made.parent >= 0) & (made.parent < n) & (made.node >= 0) & (made.node < n)
-    length[there] = distance(q[made.parent[there]], q[made.node[there]])
+    for first in range(0, len(length), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        node, parent = made.node[some], made.parent[some]
+        there = np.flatnonzero((parent >= 0) & (parent < n) & (node >= 0) & (node < n))
+        length[first + there] = distance(q[parent[there]], q[node[there]])
     return length
 
 
@@ -114,6 +125,8 @@ def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -
         asked: Questions.
     """
     nodes = int(made.joins.sum())
+    if nodes == len(made.seq) and length is not None:
+        return _grown(made, length, asked)
     if length is None:
         length = np.full(len(made.seq), np.nan)
     parent, links = np.full(nodes, -1, np.int64), np.full((nodes, 3), -1, np.int64)
@@ -128,6 +141,30 @@ def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -
         parent, links, cost, lengths, parent_cost, before, verdict,
     )  # fmt: skip
     return Ledger(parent, cost, parent_cost, before, verdict, answers)
+
+
+def _grown(made: Changes, length: Floats, asked: Questions) -> Ledger:
+    """Fold a tree that only grows: no cost changes, so there is less to keep."""
+    nodes = np.arange(len(made.seq))
+    there = (made.parent >= 0) & (made.parent < nodes)
+    parent = np.where(there, made.parent, -1).astype(np.int64)
+    cost = np.array(made.stated, np.float64)
+    _sum_up(parent, length, cost)
+    verdict = np.where(there | (made.parent < 0), SOUND, NO_PARENT).astype(np.uint8)
+    born = np.searchsorted(made.seq, asked.seq, side="right")
+    known = (asked.node >= 0) & (asked.node < born)
+    answers = np.full(len(asked.seq), np.nan)
+    answers[known] = cost[asked.node[known]]
+    parent_cost = np.where(there, cost[parent], np.nan)
+    return Ledger(parent, cost, parent_cost, np.broadcast_to(np.nan, len(nodes)), verdict, answers)
+
+
+@kernel
+def _sum_up(parent: Ints, length: Floats, cost: Floats) -> None:
+    """Make each cost the parent's and the length; of what has no parent it stays."""
+    for i in range(len(parent)):
+        if parent[i] >= 0:
+            cost[i] = cost[parent[i]] + length[i]
 
 
 _CHILD, _NEXT, _LAST = range(3)

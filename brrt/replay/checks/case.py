@@ -1,7 +1,7 @@
-"""What rules look at, and how they say what they found."""
+"""What rules look at."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.planners import PLANNERS
 from brrt.planners.contract import Contract
+from brrt.replay.checks.keeping import Kept
 from brrt.replay.checks.motions import Obstacles, first_hits
-from brrt.replay.ledger import Changes, Ledger, changes, edge_lengths, fold
+from brrt.replay.checks.tally import Tally
+from brrt.replay.ledger import Changes, Ledger, changes, edge_lengths, fold, of_tree
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
@@ -24,68 +26,15 @@ CLOSE = 1e-9
 ROUNDING = 1e-14
 """The same, as a part of the coordinates: a short motion far from the origin is rounded most."""
 
-_SHOWN = 20
+_AT_ONCE = 1 << 18
+
+Windows = Generator[None, Events | None]
+"""A rule that looks at events as they are read: it is sent window after window, then None."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A promise that an event breaks.
-
-    Attributes:
-        rule: Name of the rule.
-        seq: The event's number; -1 where the whole log is meant.
-        t: Its time in ns.
-        message: What is wrong with it.
-    """
-
-    rule: str
-    seq: int
-    t: int
-    message: str
-
-
-@dataclass(slots=True)
-class Tally:
-    """What a rule looked at; of many findings the first are kept, all are counted.
-
-    Attributes:
-        rule: Name of the rule.
-        promise: What it holds a run to.
-        examined: Things looked at.
-        broken: Things that break the promise.
-        findings: The first of those.
-    """
-
-    rule: str
-    promise: str
-    examined: int = 0
-    broken: int = 0
-    findings: list[Finding] = field(default_factory=list)
-
-    def look(self, table: Table, wrong: NDArray[np.bool_], say: Callable[[int], str]) -> None:
-        """Take in rows of a table.
-
-        Args:
-            table: Events, shape (n,).
-            wrong: Which of them break the promise, shape (n,).
-            say: What is wrong with the row of that number.
-        """
-        self.examined += len(table)
-        at = np.flatnonzero(wrong)
-        self.broken += len(at)
-        for i in at[: _SHOWN - len(self.findings)].tolist():
-            row = table[i]
-            self.findings.append(Finding(self.rule, int(row["seq"]), int(row["t"]), say(i)))
-
-    def one(self, event: Any, message: str | None) -> None:
-        """Take in one event, or None for the log as a whole; no message where all is well."""
-        self.examined += 1
-        if message is None:
-            return
-        self.broken += 1
-        if len(self.findings) < _SHOWN:
-            seq, t = (-1, 0) if event is None else (int(event["seq"]), int(event["t"]))
-            self.findings.append(Finding(self.rule, seq, t, message))
+def waypoints(event: Any, dof: int) -> Floats:
+    """A path's configurations, shape (n, dof)."""
+    return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +59,16 @@ class Grown:
 
     def of_edges(self, column: NDArray[Any]) -> NDArray[Any]:
         """The part of a column of changes that belongs to the edges."""
-        return column[self.made.joins]
+        return column[self.made.joins] if len(self.rewires) else column
 
     def of_rewires(self, column: NDArray[Any]) -> NDArray[Any]:
         """The part that belongs to the rewires."""
-        return column[~self.made.joins]
+        return column[~self.made.joins] if len(self.rewires) else column[:0]
+
+    def spans(self) -> Iterator[slice]:
+        """Yield the edges in parts: of millions not all can be looked at at once."""
+        for first in range(0, len(self.edges), _AT_ONCE):
+            yield slice(first, min(first + _AT_ONCE, len(self.edges)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +78,7 @@ class Case:
     Attributes:
         manifest: The run's.
         world: The run's.
-        events: The whole log.
+        kept: What is kept of the log, which is read in windows.
         robot: What moves.
         start: First configuration, shape (dof,).
         goal: Last configuration, shape (dof,).
@@ -132,12 +86,12 @@ class Case:
         upper: Greatest configuration, shape (dof,).
         contract: What the planner promises.
         known: Whether the planner is known here, so that there is a contract.
-        cut: Whether the log breaks off.
+        breaks_off: Says, once the log was read, whether it breaks off.
     """
 
     manifest: Manifest
     world: World
-    events: Events
+    kept: Kept
     robot: Any
     start: Floats
     goal: Floats
@@ -145,26 +99,23 @@ class Case:
     upper: Floats
     contract: Contract
     known: bool
-    cut: bool = False
+    breaks_off: Callable[[], bool]
 
     @classmethod
     def of(
         cls,
         manifest: Manifest,
         world: World,
-        events: Events,
         contract: Contract | None = None,
-        *,
-        cut: bool = False,
+        breaks_off: Callable[[], bool] = lambda: False,
     ) -> Self:
         """Open the case of a recording.
 
         Args:
             manifest: The run's.
             world: The run's.
-            events: The whole log.
             contract: What the planner promises; by default what the registered one does.
-            cut: Whether the log breaks off.
+            breaks_off: Says, once the log was read, whether it breaks off.
 
         Raises:
             BrrtError: Its query is of no use in its world.
@@ -174,10 +125,26 @@ class Case:
         if contract is None and scenario.planner in PLANNERS:
             contract = scenario.make_planner().contract(problem)
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
+        known, contract = contract is not None, contract or Contract()
         return cls(
-            manifest, world, events, problem.robot, problem.start, problem.goal, *bounds,
-            contract or Contract(), contract is not None, cut,
+            manifest, world, Kept(manifest.dof, contract), problem.robot, problem.start,
+            problem.goal, *bounds, contract, known, breaks_off,
         )  # fmt: skip
+
+    @cached_property
+    def events(self) -> Events:
+        """What is kept of the log; there once the last window was read."""
+        return self.kept.events()
+
+    @property
+    def cut(self) -> bool:
+        """Whether the log breaks off; known once the last window was read."""
+        return self.breaks_off()
+
+    @property
+    def dof(self) -> int:
+        """Numbers in a configuration."""
+        return self.manifest.dof
 
     def distance(self, a: Floats, b: Floats) -> Floats:
         """Distances in the robot's metric between rows of configurations."""
@@ -222,10 +189,7 @@ class Case:
         return [self._grown(number) for number in sorted(numbers)]
 
     def _grown(self, number: int) -> Grown:
-        edges, rewires = (
-            table[table["tree"] == number]
-            for table in (self.events[Kind.EDGE], self.events[Kind.REWIRE])
-        )
+        edges, rewires = (of_tree(self.events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
         made = changes(self.events, number)
         length = edge_lengths(np.asarray(edges["q"]), made, self.distance)
         return Grown(number, edges, rewires, made, length, fold(made, length))
@@ -233,11 +197,7 @@ class Case:
     @cached_property
     def paths(self) -> list[tuple[Any, Floats]]:
         """Each path's event, and its waypoints, shape (n, dof)."""
-        dof = self.events.dof
-        return [
-            (event, np.asarray(event["waypoints"], np.float64).reshape(-1, dof))
-            for event in self.events[Kind.PATH]
-        ]
+        return [(event, waypoints(event, self.dof)) for event in self.events[Kind.PATH]]
 
     @property
     def found(self) -> list[tuple[Any, Floats]]:
