@@ -13,6 +13,7 @@ from brrt.planners import PLANNERS
 from brrt.planners.contract import Contract
 from brrt.replay.checks.keeping import Kept
 from brrt.replay.checks.motions import Obstacles, first_hits
+from brrt.replay.checks.script import Scripts
 from brrt.replay.checks.tally import Tally
 from brrt.replay.ledger import Changes, Ledger, changes, edge_lengths, fold, of_tree
 from brrt.scenario import Manifest
@@ -130,6 +131,11 @@ class Case:
             manifest, world, Kept(manifest.dof, contract), problem.robot, problem.start,
             problem.goal, *bounds, contract, known, breaks_off,
         )  # fmt: skip
+
+    @cached_property
+    def scripts(self) -> Scripts:
+        """The log's events in one table, iteration by iteration, for rules that read it so."""
+        return Scripts(self.dof)
 
     @cached_property
     def events(self) -> Events:

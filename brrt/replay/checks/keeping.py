@@ -18,11 +18,19 @@ class Thinned:
     def __init__(self, dtype: np.dtype[np.void], most: int) -> None:
         self._rows, self._most, self._stride, self._seen = np.empty(0, dtype), most, 1, 0
 
-    def add(self, table: Table) -> None:
-        """Take in the next rows; keep each of a number that the stride divides."""
+    def due(self, count: int) -> slice:
+        """Which of the next rows to keep: those of a number that the stride divides."""
         first = -self._seen % self._stride
-        self._rows = np.concatenate([self._rows, table[first :: self._stride]])
-        self._seen += len(table)
+        self._seen += count
+        return slice(first, None, self._stride)
+
+    def add(self, table: Table) -> None:
+        """Take in the next rows."""
+        self.keep(table[self.due(len(table))])
+
+    def keep(self, rows: Table) -> None:
+        """Keep rows that were due."""
+        self._rows = np.concatenate([self._rows, rows])
         while len(self._rows) > 2 * self._most:
             self._rows, self._stride = self._rows[::2], 2 * self._stride
 
