@@ -10,7 +10,7 @@ from brrt.replay.checks.keeping import Thinned
 from brrt.replay.checks.log import text
 from brrt.replay.checks.motions import towards
 from brrt.replay.checks.neighbours import Neighbours, nearest
-from brrt.replay.checks.script import heads_for_other, last_where, script_dtype
+from brrt.replay.checks.script import followed, heads_for_other, last_where, script_dtype
 from brrt.replay.checks.tally import Tally
 
 Floats = NDArray[np.float64]
@@ -143,9 +143,7 @@ def goal_tries(case: Case, tally: Tally) -> Windows:
         window = yield
         lines = case.scripts.of(window)
         if growth is not None and growth.goal_test and len(lines):
-            # What follows the last line is in the next script, and is a sample.
-            after = np.append(lines[1:], np.zeros(1, lines.dtype))
-            after["kind"][-1] = Kind.SAMPLE
+            after = followed(lines)[1:]
             far = case.distance(np.asarray(lines["q"]), case.goal[None])
             tried = (after["kind"] == Kind.REJECT) & (after["why"] == Reason.GOAL_BLOCKED)
             tried &= after["node"] == lines["node"]
@@ -173,9 +171,9 @@ def link_tries(case: Case, tally: Tally) -> Windows:
     while True:
         window = yield
         lines = case.scripts.of(window)
-        if growth is not None and growth.links is not None and len(lines) > 1:
+        if growth is not None and growth.links is not None and len(lines):
             if case.contract.near is None:
-                _look_acts(tally, growth, lines)
+                _look_acts(tally, growth, lines if window is None else followed(lines))
             elif not (window is None and case.cut):
                 _look_meetings(tally, lines)
         if window is None:

@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.replay.checks.scenery import keys
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Distance = Callable[[Floats, Floats], Floats]
@@ -64,9 +62,14 @@ class Neighbours:
             apart = self._distance(self._places[some][:, None], centres[None])
             reach = far + self._radius[some][:, None]
             place, block = np.nonzero(apart <= reach * (1 + _SLACK))
-            left -= apart.size + len(place) * size
+            # Places that would take more than is left are left out.
+            ends = np.searchsorted(place, np.arange(1, len(some) + 1))
+            spent = np.arange(1, len(some) + 1) * len(centres) + ends * size
+            done = max(int(np.searchsorted(spent, left)), 1)
+            left -= int(spent[done - 1])
+            some, chosen = some[:done], slice(ends[done - 1])
             self.looked[some] = True
-            yield from self._within(some, place, block, order, size)
+            yield from self._within(some, place[chosen], block[chosen], order, size)
 
     def _within(
         self, rows: Ints, place: Ints, block: Ints, order: Ints, size: int
@@ -89,7 +92,7 @@ class Neighbours:
     def _blocks(self, nodes: int) -> tuple[Ints, int, Floats, Floats]:
         """Sort the first nodes into blocks of a size; return centres, and how far each reaches."""
         q = self._q[:nodes]
-        order, size = np.argsort(keys(q), kind="stable"), max(8, int(len(q) ** 0.5))
+        order, size = np.argsort(_curve(q), kind="stable"), max(8, int(len(q) ** 0.5))
         starts = np.arange(0, len(q), size)
         centres = q[order[np.minimum(starts + size // 2, len(q) - 1)]]
         far = np.empty(len(starts))
@@ -100,6 +103,18 @@ class Neighbours:
             away = self._distance(q[some], centres[first + block])
             far[first : first + many] = np.maximum.reduceat(away, starts[: block[-1] + 1])
         return order, size, centres, far
+
+
+def _curve(q: Floats) -> Ints:
+    """Number places along a curve that leaves no neighbourhood in a hurry (Morton 1966)."""
+    low, high = q.min(axis=0), q.max(axis=0)
+    bits = min(16, 60 // q.shape[1])
+    cells = np.nan_to_num((q - low) / np.where(high > low, high - low, 1)) * (2.0**bits - 1)
+    whole, keys = cells.astype(np.int64), np.zeros(len(q), np.int64)
+    for bit in range(bits - 1, -1, -1):
+        for k in range(q.shape[1]):
+            keys = keys << 1 | whole[:, k] >> bit & 1
+    return keys
 
 
 def nearest(near: Neighbours) -> tuple[Ints, Floats, Floats]:

@@ -116,7 +116,7 @@ def near(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints
         high: Greatest corners, shape (n, d).
         obstacles: What is in the way; what is far from a group along an axis costs nothing.
     """
-    order = np.argsort(keys((low + high) / 2), kind="stable")
+    order = np.argsort(_keys((low + high) / 2), kind="stable")
     starts = np.arange(0, len(order), _GROUP)
     ends = np.stack([low[order], high[order]])
     groups = np.minimum.reduceat(ends[0], starts), np.maximum.reduceat(ends[1], starts)
@@ -163,7 +163,7 @@ def _meet(low: Floats, high: Floats, other_low: Floats, other_high: Floats) -> F
     return meets
 
 
-def keys(places: Floats) -> Ints:
+def _keys(places: Floats) -> Ints:
     """Number cells of a grid, so that places in one cell have one key, shape (n,)."""
     low, high = places.min(axis=0), places.max(axis=0)
     cells = ((places - low) / np.where(high > low, high - low, 1) * (_CELLS - 1)).astype(np.int64)

@@ -75,6 +75,13 @@ class Scripts:
         return self._made
 
 
+def followed(lines: Table) -> Table:
+    """Add to a script what the next one begins with, a sample, of which only that is known."""
+    lines = np.append(lines, np.zeros(1, lines.dtype))
+    lines["kind"][-1] = Kind.SAMPLE
+    return lines
+
+
 def last_where(chosen: NDArray[np.bool_]) -> Ints:
     """For each line the last one up to it that is chosen, or -1, shape (n,)."""
     return np.maximum.accumulate(np.where(chosen, np.arange(len(chosen)), -1))
