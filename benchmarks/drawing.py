@@ -12,11 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rerun as rr
 
 from brrt import Events, Memory, Run, Scenario
 from brrt.events import FIELDS
-from brrt.recording.columns import time_columns, to_arrow
+from brrt.recording.columns import to_arrow
 from brrt.recording.rerun import RerunSink
 
 RUNS: dict[str, dict[str, Any]] = {
@@ -55,9 +56,14 @@ def bare(run: Run, batches: list[Events], path: Path) -> None:
     rec.save(path)
     for batch in batches:
         for kind, table in batch.tables.items():
+            times = [
+                rr.TimeColumn("iteration", sequence=np.ascontiguousarray(table["iteration"])),
+                rr.TimeColumn("event", sequence=np.ascontiguousarray(table["seq"])),
+                rr.TimeColumn("t", duration=table["t"].astype("m8[ns]")),
+            ]
             values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
             columns = rr.DynamicArchetype.columns(kind.label, components=values)
-            rec.send_columns(f"/ev/{kind.label}", time_columns(table), columns)
+            rec.send_columns(f"/ev/{kind.label}", times, columns)
         rec.flush()
     rec.disconnect()
 

@@ -8,15 +8,20 @@ metrics = run.execute([log])
 tree = brrt.forest(log.events())[0]
 """
 
+from brrt.again import BranchedRun, RepeatedRun
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
+from brrt.recording.versus import compare
+from brrt.repeat import Again, plan_again
 from brrt.replay.checks import Finding, check
+from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
+from brrt.replay.moment import Moment
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
@@ -27,8 +32,11 @@ __all__ = [
     "PLANNERS",
     "ROBOTS",
     "RRT",
+    "Again",
+    "BranchedRun",
     "BrrtError",
     "Chain",
+    "Comparison",
     "Difference",
     "Events",
     "Finding",
@@ -38,12 +46,14 @@ __all__ = [
     "McapSink",
     "Memory",
     "Metrics",
+    "Moment",
     "Planner",
     "Point",
     "Polygon",
     "Problem",
     "Recording",
     "RecordingError",
+    "RepeatedRun",
     "Robot",
     "Run",
     "Scenario",
@@ -51,9 +61,11 @@ __all__ = [
     "Tree",
     "World",
     "check",
+    "compare",
     "first_difference",
     "forest",
     "make_robot",
     "make_world",
+    "plan_again",
     "read",
 ]

@@ -70,21 +70,26 @@ class Run:
             scenario = replace(scenario, world=world.name)
         if planner is not None:
             scenario = _named(scenario, planner)
-        self._planner = scenario.make_planner() if planner is None else planner
-        self.problem, self._smoother = scenario.make_problem(world), scenario.make_smoother()
-        self._execute = scenario.make_execute()
+        solver = scenario.make_planner() if planner is None else planner
+        self._set_up(scenario, scenario.make_problem(world), solver, batch)
+
+    def _set_up(self, scenario: Scenario, problem: Problem, planner: Solver, batch: int) -> None:
+        """Make ready all that `events` needs."""
+        self._planner, self.problem = planner, problem
+        self._smoother, self._execute = scenario.make_smoother(), scenario.make_execute()
         self._compile()
-        self._log = EventLog(self.problem.dof, batch, logical_clock=scenario.clock == "logical")
+        self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
+        self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
         self.stop = scenario.make_stop()
         self.manifest = Manifest(
             scenario=scenario,
-            start=tuple(self.problem.start.tolist()),
-            goal=tuple(self.problem.goal.tolist()),
-            dim=self.problem.world.dim,
-            dof=self.problem.dof,
+            start=tuple(problem.start.tolist()),
+            goal=tuple(problem.goal.tolist()),
+            dim=problem.world.dim,
+            dof=problem.dof,
             epoch_ns=self._log.epoch_ns,
             made_by=made_by(),
-            robot=self.problem.robot.to_json(),
+            robot=problem.robot.to_json(),
         )
 
     def _compile(self) -> None:
@@ -103,9 +108,8 @@ class Run:
 
     def events(self) -> Iterator[Events]:
         """Plan, smooth, drive; yield what happens, in batches."""
-        rng = np.random.Generator(np.random.PCG64(self.manifest.scenario.seed))
         path, moved, iteration = None, False, 0
-        for batch in self._planner.solve(self.problem, rng, self._log, self.stop):
+        for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):
             path = _last_path(batch, path)
             moved = moved or Kind.MOVE in batch.counts
             # A planner may have gone on after its path; the count never falls.
@@ -116,7 +120,7 @@ class Run:
         waypoints, space = path["waypoints"], self.problem.space
         if self._smoother is not None and not self.stop.interrupted:
             for batch in self._smoother.smooth(
-                waypoints, space, rng, self._log, self.stop, iteration
+                waypoints, space, self._rng, self._log, self.stop, iteration
             ):
                 waypoints = _last_path(batch, path)["waypoints"]
                 yield batch

@@ -1,5 +1,6 @@
 """A scenario: everything that decides what a run does, as a user writes it and a file keeps it."""
 
+import hashlib
 import json
 import tomllib
 from collections.abc import Mapping
@@ -21,7 +22,7 @@ from brrt.worlds import World, make_world, world_beside
 RANDOM: Literal["random"] = "random"
 """A start or goal that the scenario's seed decides."""
 
-_MOST = 10**15
+MOST = 10**15
 """Above any count that a run could reach, and well within 64 bits."""
 
 _NOWHERE = np.full(3, np.nan)
@@ -156,7 +157,8 @@ class Scenario:
 
     def with_stop_at(self, iterations: int) -> "Scenario":
         """Return the scenario of a run that the clock or a person cut, ended at that iteration."""
-        return replace(self, draws=max(1, iterations), time=None)
+        most = self.make_stop().iterations
+        return replace(self, draws=max(1, iterations), iterations=most, time=None)
 
     def make_planner(self) -> Planner:
         """Make the planner with its settings.
@@ -185,7 +187,7 @@ class Scenario:
     def make_stop(self) -> Stop:
         """Make the budget."""
         planner = PLANNERS.get(self.planner, Planner)
-        usual = _MOST if self.time is not None else planner.default_iterations
+        usual = MOST if self.time is not None else planner.default_iterations
         iterations = usual if self.iterations is None else self.iterations
         return Stop(iterations=iterations, draws=self.draws, time_s=self.time)
 
@@ -240,8 +242,8 @@ def _whole(name: str, value: Any, *, low: int) -> None:
         raise BrrtError(f"{name} must be a whole number, not {value!r}")
     if value < low:
         raise BrrtError(f"{name} must be at least {low}, not {value}")
-    if name != "seed" and value > _MOST:
-        raise BrrtError(f"{name} must be at most {_MOST:,}, not {value}")
+    if name != "seed" and value > MOST:
+        raise BrrtError(f"{name} must be at most {MOST:,}, not {value}")
 
 
 def _configuration(name: str, value: Any) -> tuple[float, ...] | Literal["random"]:
@@ -259,6 +261,50 @@ def _no_configuration(name: str, value: Any) -> BrrtError:
 
 
 @dataclass(frozen=True, slots=True)
+class Branch:
+    """Where a run went on from a recorded one with other settings.
+
+    Attributes:
+        parent: Digest of the recorded run's manifest; see `Manifest.digest`.
+        file: Name of its file; empty where it had none.
+        iteration: The last iteration that both share.
+        events: How many events both share; the first of the run's own has this number.
+        scenario: What ruled up to there.
+        seed: Seed of the draws from there on; None where the generator simply went on.
+    """
+
+    parent: str
+    file: str
+    iteration: int
+    events: int
+    scenario: Scenario
+    seed: int | None = None
+
+    def told(self, after: Scenario) -> str:
+        """Say what is otherwise from here on, where another scenario rules."""
+        before, now = ({**s.as_dict(), **s.settings()} for s in (self.scenario, after))
+        names = [n for n in now if n not in ("params", "seed", "start", "goal", "draws")]
+        parts = [f"{n} {now[n]}, was {before[n]}" for n in names if now[n] != before.get(n)]
+        parts += [] if self.seed is None else [f"draws from seed {self.seed}"]
+        return "; ".join(parts) or "all as before"
+
+    @classmethod
+    def parse(cls, values: Mapping[str, Any]) -> Self:
+        """Read what `dataclasses.asdict` made of one.
+
+        Raises:
+            KeyError: A field is missing.
+            TypeError: There is one too many.
+            ValueError: A number is none, or below 0.
+        """
+        known = {**values, "scenario": Scenario.parse(values["scenario"])}
+        known |= {name: int(values[name]) for name in ("iteration", "events")}
+        if min(known["iteration"], known["events"]) < 0:
+            raise ValueError("a branch before the beginning")
+        return cls(**known)
+
+
+@dataclass(frozen=True, slots=True)
 class Manifest:
     """What a recording says about the run that made it, written before the first event.
 
@@ -272,6 +318,8 @@ class Manifest:
         made_by: Versions of brrt and of what it stands on, and the platform.
         robot: The robot's definition in JSON, settled in the world; None in recordings that were
             made before there were robots to define.
+        branches: Where the settings changed, in order, for a run that goes on from a recorded one;
+            the scenario is what rules from the last of them on.
     """
 
     scenario: Scenario
@@ -282,8 +330,22 @@ class Manifest:
     epoch_ns: int
     made_by: Mapping[str, str]
     robot: str | None = None
+    branches: tuple[Branch, ...] = ()
 
-    FORMAT = "1"
+    FORMAT, BRANCHED = "1", "2"
+    """A run that changed its settings on the way is of a format of its own: who does not know of
+    that would hold all of it to the last settings."""
+
+    @property
+    def stretches(self) -> tuple[tuple[int, Scenario], ...]:
+        """The number of the event that each scenario rules from, and the scenario, in order."""
+        firsts = (0, *(branch.events for branch in self.branches))
+        scenarios = (*(branch.scenario for branch in self.branches), self.scenario)
+        return tuple(zip(firsts, scenarios, strict=True))
+
+    def digest(self) -> str:
+        """Return a name for the run: the same where everything is, the clock included."""
+        return hashlib.sha256(json.dumps(self.to_strings()).encode()).hexdigest()
 
     def make_robot(self) -> Robot:
         """Make the robot that the run was made with, even where its file is gone.
@@ -296,8 +358,10 @@ class Manifest:
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
         texts = {} if self.robot is None else {"robot": self.robot}
+        if self.branches:
+            texts["branches"] = json.dumps([asdict(branch) for branch in self.branches])
         return texts | {
-            "format": self.FORMAT,
+            "format": self.BRANCHED if self.branches else self.FORMAT,
             "scenario": json.dumps(self.scenario.as_dict()),
             "start": json.dumps(self.start),
             "goal": json.dumps(self.goal),
@@ -314,7 +378,7 @@ class Manifest:
         Raises:
             BrrtError: A field is missing or damaged, or the format is newer than this brrt.
         """
-        if texts.get("format") != cls.FORMAT:
+        if texts.get("format") not in (cls.FORMAT, cls.BRANCHED):
             raise BrrtError(
                 f"recording format {texts.get('format')!r} is not {cls.FORMAT!r}; update brrt"
             )
@@ -328,6 +392,7 @@ class Manifest:
                 int(texts["epoch_ns"]),
                 dict(json.loads(texts["made_by"])),
                 texts.get("robot"),
+                tuple(map(Branch.parse, json.loads(texts.get("branches", "[]")))),
             )
         except (KeyError, ValueError, TypeError, RecursionError) as error:
             raise BrrtError(f"the manifest is damaged: {error!r}") from None

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 import typer
 
 from .console import Code, complain
+from .diff import diff
+from .explain import explain
 from .export import export
 from .lists import planners, robots
 from .plan import plan
 from .plot import plot
+from .recover import recover
 from .replay import replay
 from .verify import verify
 from .view import view
@@ -31,9 +34,16 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
 
+[bold]brrt diff a.mcap b.mcap[/bold] compares two runs, and says where they part
+
+
+[bold]brrt explain run.mcap[/bold] says why it failed, or took long, and what to try
+
 [bold]brrt view run.mcap[/bold] shows the tree as it grows
 
 [bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
+
+[bold]brrt recover cut.mcap --out whole.mcap[/bold] saves what a killed run left
 
 [bold]brrt planners[/bold] lists what there is to set
 
@@ -44,8 +54,11 @@ app.command()(plan)
 app.command()(replay)
 app.command()(plot)
 app.command()(verify)
+app.command()(diff)
+app.command()(explain)
 app.command()(export)
 app.command()(view)
+app.command()(recover)
 app.command()(planners)
 app.command()(robots)
 app.add_typer(worlds, name="worlds")

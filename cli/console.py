@@ -37,6 +37,20 @@ def note(message: str) -> None:
     err.print("brrt: " + message, style="dim", markup=False, soft_wrap=True)
 
 
+def tell_of_compiling() -> None:
+    """Say once that kernels are being compiled, where they are."""
+    from brrt.kernels.jit import CACHE_FOLDER, on_compiling  # noqa: PLC0415
+
+    if CACHE_FOLDER is None:
+        note(
+            "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
+            "written; name one in the variable BRRT_CACHE_DIR"
+        )
+        return
+    text = "compiling the planner for this robot, once on this machine (10 to 20 s)"
+    on_compiling(lambda: note(text))
+
+
 def print_json(data: Mapping[str, Any]) -> None:
     """Print one object on stdout, as plain text."""
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")

@@ -1,8 +1,8 @@
-"""The instant of a run that a user asks for, and the events up to it."""
+"""The instant of a run that a user asks for."""
 
 import re
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -32,17 +32,14 @@ def instant(at: str | None, event: int | None, iteration: int | None) -> dict[st
         BrrtError: It is no time, lies before the start, or more than one is given.
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.replay import moment  # noqa: PLC0415
 
-    given = {"t": at, "seq": event, "iteration": iteration}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if len(chosen) > 1:
+    if sum(value is not None for value in (at, event, iteration)) > 1:
         raise BrrtError("give one of --at, --at-event and --at-iteration")
-    if at is not None:
-        return {"t": _nanoseconds(at)}
-    found = {name: int(value) for name, value in chosen.items()}
-    if any(value < 0 for value in found.values()):
+    if any(value is not None and value < 0 for value in (event, iteration)):
         raise BrrtError("--at-event and --at-iteration count from 0")
-    return found
+    time = None if at is None else _seconds(at)
+    return moment.instant(time=time, event=event, iteration=iteration)
 
 
 def beyond(limits: dict[str, int], count: int, last: "Instant") -> str | None:
@@ -65,32 +62,26 @@ def beyond(limits: dict[str, int], count: int, last: "Instant") -> str | None:
     return None
 
 
-def feed(
-    batches: "Iterable[Events]", sinks: list[Any], limits: dict[str, int]
-) -> "tuple[int, Instant] | None":
-    """Hand the events up to the limits to the sinks.
+class Counted:
+    """Yields batches and keeps count, so that `beyond` can be asked how far they went."""
 
-    Returns:
-        How many events there are and when the last one happened; None if the limits cut them.
-    """
-    from brrt.events import Instant  # noqa: PLC0415
+    def __init__(self, batches: "Iterable[Events]") -> None:
+        from brrt.events import Instant  # noqa: PLC0415 - keep --help fast
 
-    count, last = 0, Instant(0, 0)
-    for batch in batches:
-        part = batch.until(**limits) if limits else batch
-        for sink in sinks:
-            sink.write(part)
-        if len(part) < len(batch):
-            return None
-        count, last = count + len(batch), batch.last if len(batch) else last
-    return count, last
+        self._batches = batches
+        self.count, self.last = 0, Instant(0, 0)
+
+    def __iter__(self) -> "Iterator[Events]":
+        for batch in self._batches:
+            self.count += len(batch)
+            self.last = batch.last if len(batch) else self.last
+            yield batch
 
 
-def _nanoseconds(text: str) -> int:
+def _seconds(text: str) -> float:
     from brrt.errors import BrrtError  # noqa: PLC0415
 
     match = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*(s|ms|us|ns)?", text.strip())
     if match is None:
         raise BrrtError(f"--at must be a time like 1.5s, 20ms or 300us, not {text!r}")
-    unit = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}[match[2] or "s"]
-    return int(float(match[1]) * unit)
+    return float(match[1]) * {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[match[2] or "s"]

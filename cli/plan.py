@@ -1,11 +1,15 @@
 """`brrt plan`: run a planner and record it."""
 
+import shlex
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
-from .console import Code, Watch, note, out, print_json, print_summary
+from .console import Code, Watch, note, out, print_json, print_summary, tell_of_compiling
+from .instants import At, AtEvent, AtIteration, instant
 from .numbers import whole_number
 
 if TYPE_CHECKING:
@@ -112,8 +116,8 @@ def plan(
         Path | None,
         typer.Option(
             "--out",
-            help="Write the MCAP recording here. Default run.mcap, with run.rrd beside it, "
-            "where neither --out nor --rrd is given.",
+            help="Write the MCAP recording here. Default run.mcap (branch.mcap with --from), with "
+            "run.rrd beside it, where neither --out nor --rrd is given.",
             rich_help_panel="Recording",
         ),
     ] = None,
@@ -133,6 +137,20 @@ def plan(
             "--view", help="Watch it live in the Rerun viewer.", rich_help_panel="Recording"
         ),
     ] = False,
+    parent: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="Go on from this recording, from the end of planning or from the instant below, "
+            "with other parameters, seed, budget, smoothing or moves; what is not given stays. "
+            "Budgets count from the start of the recording.",
+            metavar="RUN",
+            rich_help_panel="Branch",
+        ),
+    ] = None,
+    at: At = None,
+    at_event: AtEvent = None,
+    at_iteration: AtIteration = None,
     clock: Annotated[
         str | None,
         typer.Option(
@@ -153,6 +171,8 @@ def plan(
     brrt plan --world map.txt --start 0,0,1 --goal 12,12,5 --time 10 --view
 
     brrt plan experiment.toml --seed 3 --json
+
+    brrt plan --from run.mcap --at-iteration 100 --param step=2
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.planners.stop import stop_on_signals  # noqa: PLC0415
@@ -162,8 +182,14 @@ def plan(
 
     if not record and (mcap or rrd):
         raise BrrtError("--no-record contradicts --out and --rrd; leave one of them out")
+    limits = instant(at, at_event, at_iteration)
+    if limits and parent is None:
+        raise BrrtError(
+            "--at, --at-event and --at-iteration say where to branch --from a recording"
+        )
     if record and mcap is None and rrd is None:
-        mcap, rrd = Path("run.mcap"), Path("run.rrd")
+        name = "run" if parent is None else "branch"
+        mcap, rrd = Path(f"{name}.mcap"), Path(f"{name}.rrd")
     check_output(mcap, "--out", ".mcap", force=force)
     check_output(rrd, "--rrd", ".rrd", force=force)
     check_display(view=view)
@@ -173,13 +199,21 @@ def plan(
         "shortcuts": shortcuts, "execute": execute, "max_move": max_move, "deadline": deadline,
         "clock": clock,
     }  # fmt: skip
-    settings = _merged(scenario, given, param or [])
-    _tell_of_compiling()
-    with Watch(settings.iterations, "preparing the planner").running() as watch:
-        run = Run(settings)
+    wanted = {name: value for name, value in given.items() if value is not None}
+    if parent is None:
+        settings = _merged(scenario, wanted, param or [])
+        prepare = partial(Run, settings)
+    else:
+        from .branch import check_parent, go_on  # noqa: PLC0415
+
+        check_parent(parent, scenario, mcap, rrd)
+        prepare = partial(go_on, parent, limits, wanted, _params(param or []))
+    tell_of_compiling()
+    with Watch(iterations, "preparing the planner").running() as watch:
+        run = prepare()
         for line in run.problem.world.notes:
             note(line)
-        watch.total = None if settings.time is not None else run.stop.iterations
+        watch.total = None if run.stop.time_s is not None else run.stop.iterations
         with stop_on_signals(run.stop):
             metrics = run.execute(_sinks(run, mcap, rrd, view=view), lambda m: _show(m, watch))
     _report(metrics, mcap, rrd, as_json=as_json)
@@ -191,19 +225,27 @@ def plan(
 
 def _merged(file: Path | None, given: dict[str, Any], params: list[str]) -> "Scenario":
     """Put what was given on the command line on top of the file, if there is one."""
-    from brrt.errors import BrrtError  # noqa: PLC0415
     from brrt.scenario import Scenario  # noqa: PLC0415
 
     base = Scenario() if file is None else Scenario.load(file)
-    values = {**base.as_dict(), **{k: v for k, v in given.items() if v is not None}}
+    values = {**base.as_dict(), **given}
     if values["planner"] != base.planner:
         values["params"] = {}
-    for text in params:
+    values["params"] = {**values["params"], **_params(params)}
+    return Scenario.parse(values)
+
+
+def _params(texts: list[str]) -> dict[str, str]:
+    """Read the planner's parameters."""
+    from brrt.errors import BrrtError  # noqa: PLC0415
+
+    found = {}
+    for text in texts:
         name, equals, value = text.partition("=")
         if not equals:
             raise BrrtError(f"--param {text!r} must read name=value, as step=2")
-        values["params"] = {**values["params"], name.strip(): value.strip()}
-    return Scenario.parse(values)
+        found[name.strip()] = value.strip()
+    return found
 
 
 def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> list["Sink"]:
@@ -218,19 +260,6 @@ def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> li
 
         sinks.append(Background(RerunSink(run.manifest, world, path=rrd, view=view)))
     return sinks
-
-
-def _tell_of_compiling() -> None:
-    from brrt.kernels.jit import CACHE_FOLDER, on_compiling  # noqa: PLC0415
-
-    if CACHE_FOLDER is None:
-        note(
-            "compiling the planner (10 to 20 s), again in each run: no folder to keep it in can be "
-            "written; name one in the variable BRRT_CACHE_DIR"
-        )
-        return
-    text = "compiling the planner for this robot, once on this machine (10 to 20 s)"
-    on_compiling(lambda: note(text))
 
 
 def _show(metrics: "Metrics", watch: Watch) -> None:
@@ -249,7 +278,12 @@ def _report(metrics: "Metrics", mcap: Path | None, rrd: Path | None, *, as_json:
         print_json(figures)
         return
     print_summary(figures)
-    if mcap is not None:
-        out.print(f"\n{mcap}: look inside with [bold]brrt replay {mcap}[/bold]")
-    if rrd is not None:
-        out.print(f"{rrd}: watch it with [bold]rerun {rrd}[/bold]")
+    shown = rrd or mcap  # what is drawn already opens sooner
+    ways = [(mcap, "look inside", "replay"), (shown, "watch it", "view")]
+    for number, (path, what, command) in enumerate(way for way in ways if way[0] is not None):
+        typed = escape(shlex.quote(str(path)))
+        gap = "" if number else "\n"
+        out.print(
+            f"{gap}{escape(str(path))}: {what} with [bold]brrt {command} {typed}[/bold]",
+            soft_wrap=True,
+        )

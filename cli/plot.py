@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from .console import Watch, note, out
-from .instants import At, AtEvent, AtIteration, beyond, feed, instant
+from .instants import At, AtEvent, AtIteration, beyond, instant
 from .saved import Saved
 
 if TYPE_CHECKING:
@@ -166,6 +166,7 @@ def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "lis
     from brrt.events import Events  # noqa: PLC0415
     from brrt.pictures.history import Record  # noqa: PLC0415
     from brrt.recording import Memory, read  # noqa: PLC0415
+    from brrt.replay.moment import feed  # noqa: PLC0415
 
     names = Counter(run.stem for run in runs)
     records = []

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
-from .instants import At, AtEvent, AtIteration, beyond, feed, instant
+from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
+from .node import show_node, tree_number
 from .saved import Saved
 
 if TYPE_CHECKING:
-    from brrt.events import Events
+    from brrt.events import Instant
     from brrt.recording import Recording
+    from brrt.replay.growth import TreeFigures
 
 _VERB = "replay them"
 
@@ -21,6 +23,17 @@ def replay(
     at: At = None,
     at_event: AtEvent = None,
     at_iteration: AtIteration = None,
+    node: Annotated[
+        int | None,
+        typer.Option(
+            help="Tell what became of this node: born, rewired, its descendants, what was "
+            "rejected; with a planner on a lattice, of this cell.",
+        ),
+    ] = None,
+    tree: Annotated[
+        str | None,
+        typer.Option(help="The node's tree: start (default), goal, or its number.", metavar="TREE"),
+    ] = None,
     check: Annotated[
         Path | None,
         typer.Option(
@@ -55,55 +68,92 @@ def replay(
     brrt replay run.mcap --check recordings/circles2d-rrt.mcap
 
     brrt replay run.mcap --at-iteration 400 --rrd first400.rrd
+
+    brrt replay run.mcap --node 80 --at-iteration 400
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.account import Account  # noqa: PLC0415
+    from brrt.replay.growth import Growth  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
+    from brrt.replay.moment import feed  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
     check_output(rrd, "--rrd", ".rrd", force=force)
     if text and as_json:
         raise BrrtError("give one of --text and --json")
+    if tree is not None and node is None:
+        raise BrrtError("--tree is that of a node; add --node NUMBER")
+    if node is not None and (text or check or rrd):
+        raise BrrtError("--node goes with --at, --tree and --json alone")
     limits = instant(at, at_event, at_iteration)
+    number = tree_number(tree)
     recording = read(run)
+    if node is not None:
+        _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
+        return
     metrics = Metrics(recording.manifest)
-    trees = _Trees()
+    trees = Growth()
     told = Account(recording.manifest, recording.robot()) if text else None
-    sinks: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
-    end = feed(Saved(recording, partial=partial, verb=_VERB), sinks, limits)
+    folds: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
+    end = feed(Saved(recording, partial=partial, verb=_VERB), folds, limits)
     if end is not None:
-        late = beyond(limits, *end)
-        if late is not None:
-            note(f"{late}; this is how it stood then")
+        _note_end(limits, *end)
     if rrd is not None:
-        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
-
-        sink = RerunSink(recording.manifest, recording.world, path=rrd)
-        try:
-            feed(Saved(recording, partial=partial, verb=_VERB), [sink], limits)
-        finally:
-            sink.close(whole=recording.result is not None and not limits)
+        _draw(recording, rrd, limits, partial=partial)
     golden = None if check is None else read(check)
     difference = None if golden is None else _difference(recording, golden, partial=partial)
     figures = metrics.as_dict()
     if as_json:
         verdict = {} if check is None else {"check": {"equal": not difference, "first": difference}}
         print_json({**figures, **verdict})
+        raise typer.Exit(Code.FAILED if difference else Code.DONE)
+    if told is None:
+        print_summary(figures)
+        _show_trees(trees.figures())
     else:
-        if told is None:
-            print_summary(figures)
-            trees.show()
-        else:
-            print_lines(told.lines())
-        if golden is not None:
-            seeds = [each.manifest.scenario.seed for each in (recording, golden)]
-            against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"
-            outcome = f"part at {difference}" if difference else "are equal, event by event"
-            out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
-    if difference:
-        raise typer.Exit(Code.FAILED)
+        print_lines(told.lines())
+    if golden is not None:
+        seeds = [each.manifest.scenario.seed for each in (recording, golden)]
+        against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"
+        outcome = f"part at {difference}" if difference else "are equal, event by event"
+        out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
+    raise typer.Exit(Code.FAILED if difference else Code.DONE)
+
+
+def _note_end(limits: dict[str, int], count: int, last: "Instant") -> None:
+    late = beyond(limits, count, last)
+    if late is not None:
+        note(f"{late}; this is how it stood then")
+
+
+def _draw(recording: "Recording", rrd: Path, limits: dict[str, int], *, partial: bool) -> None:
+    from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
+    from brrt.replay.moment import feed  # noqa: PLC0415
+
+    sink = RerunSink(recording.manifest, recording.world, path=rrd)
+    try:
+        feed(Saved(recording, partial=partial, verb=_VERB), [sink], limits)
+    finally:
+        sink.close(whole=recording.result is not None and not limits)
+
+
+def _tell_of(
+    node: int,
+    tree: int,
+    recording: "Recording",
+    limits: dict[str, int],
+    *,
+    partial: bool,
+    as_json: bool,
+) -> None:
+    from brrt.replay.moment import Moment  # noqa: PLC0415
+
+    batches = Counted(Saved(recording, partial=partial, verb=_VERB))
+    moment = Moment(recording.manifest, recording.world, lambda: iter(batches), limits)
+    show_node(moment, node, tree, as_json=as_json)
+    _note_end(limits, batches.count, batches.last)
 
 
 def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:
@@ -116,38 +166,18 @@ def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -
     return None if found is None else str(found)
 
 
-class _Trees:
-    """Gathers what the forest is rebuilt from."""
-
-    def __init__(self) -> None:
-        self._batches: list[Events] = []
-        self._dof = 0
-
-    def write(self, events: "Events") -> None:
-        """Keep the edges and rewires."""
-        from brrt.events import Events, Kind  # noqa: PLC0415
-
-        self._dof = events.dof
-        kept = {k: t for k in (Kind.EDGE, Kind.REWIRE) if len(t := events[k])}
-        if kept:
-            self._batches.append(Events(events.dof, kept))
-
-    def show(self) -> None:
-        """Print a line a tree."""
-        from brrt.events import Events  # noqa: PLC0415
-        from brrt.replay.forest import forest  # noqa: PLC0415
-
-        trees = forest(Events.concat(self._dof, self._batches))
-        rows = [
-            {
-                "tree": str(number),
-                "nodes": f"{len(tree):,}",
-                "leaves": f"{tree.leaves:,}",
-                "depth": f"{tree.depth:,}",
-                "greatest cost-to-come": f"{tree.cost.max():.6g}",
-            }
-            for number, tree in trees.items()
-        ]
-        if rows:
-            out.print()
-            print_rows(rows)
+def _show_trees(trees: "list[TreeFigures]") -> None:
+    """Print a line a tree."""
+    rows = [
+        {
+            "tree": str(tree.tree),
+            "nodes": f"{tree.nodes:,}",
+            "leaves": f"{tree.leaves:,}",
+            "depth": f"{tree.depth:,}",
+            "greatest cost-to-come": f"{tree.greatest_cost:.6g}",
+        }
+        for tree in trees
+    ]
+    if rows:
+        out.print()
+        print_rows(rows)

@@ -36,6 +36,9 @@ class Saved:
         except CutError as error:
             saved = f"{self.events:,} events up to {last / 1e9:.6f} s are whole"
             if not self._partial:
-                raise RecordingError(f"{error}; {saved}: {self._verb} with --partial") from None
+                raise RecordingError(
+                    f"{error}; {saved}: {self._verb} with --partial, or save them with brrt recover"
+                ) from None
+            if not self.cut:  # it may be read more than once
+                note(f"{error}; {saved}")
             self.cut = True
-            note(f"{error}; {saved}")

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, note, out, print_json
+from .console import Code, Watch, note, out, print_json, print_lines, tell_of_compiling
 from .saved import Saved
 
 if TYPE_CHECKING:
+    from brrt.recording import Recording
+    from brrt.repeat import Again
     from brrt.replay.checks import Tally
 
 _SHOWN = 3
@@ -29,6 +31,21 @@ def verify(
             "is left out.",
         ),
     ] = False,
+    rerun: Annotated[
+        bool,
+        typer.Option(
+            "--rerun",
+            help="Plan the run again as well, from what the recording says of it, and compare "
+            "event by event.",
+        ),
+    ] = False,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            help="With --rerun: how far apart numbers may be, relative to the greater one, and "
+            "to 1 below that. Default 1e-9; 0 wants every bit.",
+        ),
+    ] = None,
     long: Annotated[
         bool, typer.Option("--long", help="Write each promise out in full, below its rule.")
     ] = False,
@@ -41,33 +58,74 @@ def verify(
     brrt verify run.mcap
 
     brrt verify run.mcap --long
+
+    brrt verify run.mcap --rerun
     """
-    from brrt.planners import PLANNERS  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.planners import PLANNERS  # noqa: PLC0415
     from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.checks import examine  # noqa: PLC0415
 
+    if tolerance is not None and (not rerun or not tolerance >= 0):
+        raise BrrtError("--tolerance must be a number from 0 on, and goes with --rerun alone")
     recording = read(run)
     planner = recording.manifest.scenario.planner
     saved = Saved(recording, partial=partial, verb="verify them")
-    tallies = examine(recording.manifest, recording.world, saved, cut=lambda: saved.cut)
+    # A file that brrt recover made breaks off too, though it is whole.
+    tallies = examine(
+        recording.manifest, recording.world, saved,
+        cut=lambda: saved.cut or recording.result is None,
+    )  # fmt: skip
+    cut, events = saved.cut or recording.result is None, saved.events
     broken = sum(tally.broken for tally in tallies)
+    again = _again(recording, saved, tolerance) if rerun else None
     if as_json:
         known = planner in PLANNERS
         print_json(
             {
                 "holds": not broken,
                 "planner_known": known,
-                "cut": saved.cut,
-                "events": saved.events,
+                "cut": cut,
+                "events": events,
                 "rules": _json(run, tallies),
+                **({} if again is None else {"rerun": again.as_dict()}),
             }
         )
     else:
         if planner not in PLANNERS:
             note(f"planner {planner} is not known here; its special promises were not checked")
         _show(run, tallies, long=long)
-    if broken:
+        if again is not None:
+            _show_again(again)
+    if broken or (again is not None and not again.equal):
         raise typer.Exit(Code.FAILED)
+
+
+def _again(recording: "Recording", saved: Saved, tolerance: float | None) -> "Again":
+    """Plan the run again, with a progress bar."""
+    from brrt.repeat import TOLERANCE, plan_again  # noqa: PLC0415
+
+    def watch(done: int, total: int) -> None:
+        bar.total = total
+        bar.update(done, "planning again", f"{done:,} of {total:,} events")
+
+    tell_of_compiling()
+    with Watch(None, "preparing the planner").running() as bar:
+        return plan_again(
+            recording.manifest,
+            recording.world,
+            lambda: iter(saved),
+            tolerance=TOLERANCE if tolerance is None else tolerance,
+            watch=watch,
+        )
+
+
+def _show_again(again: "Again") -> None:
+    """Print what differs, and in the last line, or the only one, whether the events are equal."""
+    *details, verdict = again.lines()
+    print_lines(details)
+    style = "bold green" if again.equal else ""
+    out.print(verdict, style=style, markup=False, soft_wrap=True)
 
 
 def _look(run: Path, seq: int) -> str:

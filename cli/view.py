@@ -147,11 +147,12 @@ def _prepare(
     from brrt.recording import read  # noqa: PLC0415 - keep --help fast
 
     recordings = [read(run) for run in runs]
-    logs = []
+    logs, cut = [], False
     for recording, run in zip(recordings, runs, strict=True):
         watch.update(0, f"reading {run.name}", "")
         saved = Saved(recording, partial=partial, verb="show them")
         logs.append([batch for batch in saved if len(batch)])
+        cut = cut or saved.cut
     _check_instant(limits, logs)
 
     from brrt.recording.drive import Cursor  # noqa: PLC0415 - costs half a second
@@ -160,7 +161,7 @@ def _prepare(
     cursor = cursors[0] if cursors else None
     if len(runs) == 2:
         return _prepare_pair(runs, recordings, logs, folder, watch, cursor)
-    if runs[0].suffix == ".rrd":
+    if runs[0].suffix == ".rrd" and not cut:
         return runs[0], cursor
     file = folder / f"{runs[0].stem}.rrd"
     _draw(recordings[0], logs[0], file, watch)

@@ -8,7 +8,7 @@ import typer
 from rich.markup import escape
 
 from .console import Watch, note, out, print_json, print_pairs, print_rows
-from .lists import Json, described, print_described
+from .lists import Json, chosen, described, print_described
 
 if TYPE_CHECKING:
     from brrt.worlds import World
@@ -55,17 +55,12 @@ def list_worlds(
     as_json: Json = False,
 ) -> None:
     """List the world generators with their parameters, and the files that can be loaded."""
-    from brrt.errors import unknown  # noqa: PLC0415 - keep --help fast
-    from brrt.worlds import GENERATORS, LOADERS  # noqa: PLC0415
+    from brrt.worlds import GENERATORS, LOADERS  # noqa: PLC0415 - keep --help fast
 
     generators, files = described(dict(GENERATORS)), described(dict(LOADERS))
     for key, loader in LOADERS.items():
         files[key] |= {"endings": list(loader.endings), "query": loader.queries}
-    entries = {**generators, **files}
-    if name is not None:
-        if name not in entries:
-            raise unknown("world", name, entries)
-        entries = {name: entries[name]}
+    entries = chosen("world", name, {**generators, **files})
     if as_json:
         print_json(entries)
         return

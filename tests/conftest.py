@@ -16,6 +16,8 @@ from hypothesis import HealthCheck, settings
 
 from brrt import Events, Memory, Run, Scenario
 
+pytest_plugins = ["pytester"]
+
 # On a busy machine the first example of a strategy may take seconds; that is no finding.
 settings.register_profile("brrt", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 # In CI a run must not fail by the draw of its examples; elsewhere each run looks at new ones.

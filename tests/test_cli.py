@@ -29,9 +29,10 @@ def test_plan_writes_both_recordings_and_says_how_to_look(brrt: Command) -> None
     assert done.code == 0, done.err
     assert "solved" in done.out
     assert "brrt replay run.mcap" in done.out
-    assert "rerun run.rrd" in done.out
+    assert "brrt view run.rrd" in done.out
     assert Path("run.mcap").stat().st_size > 1000
     assert Path("run.rrd").stat().st_size > 1000
+    assert "brrt view a.mcap" in brrt("plan", "--out", "a.mcap").out
 
 
 def test_replay_prints_what_plan_printed(brrt: Command) -> None:
@@ -284,6 +285,17 @@ def test_lists(name: str, brrt: Command) -> None:
     assert text.code == data.code == 0
     for entry in data.json:
         assert entry in text.out
+
+
+@pytest.mark.parametrize("name", ["planners", "robots", "worlds list"])
+def test_lists_show_one_alone(name: str, brrt: Command) -> None:
+    """A name after the list's picks one; a wrong one is named, with the nearest."""
+    every = brrt(*name.split(), "--json").json
+    one = min(every)
+    assert brrt(*name.split(), one, "--json").json == {one: every[one]}
+    wrong = brrt(*name.split(), one + "x")
+    assert wrong.code == 2
+    assert f"did you mean {one!r}?" in wrong.err
 
 
 def test_cache_folder_may_be_all_that_is_writable(tmp_path: Path) -> None:

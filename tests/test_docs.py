@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from brrt.recording import drive
+
 from .conftest import Result
 
 ROOT = Path(__file__).parents[1]
@@ -21,9 +23,14 @@ def blocks(language: str) -> list[str]:
 
 
 def test_readme_commands_and_code(
-    brrt: Callable[..., Result], capfd: pytest.CaptureFixture[str]
+    brrt: Callable[..., Result],
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Every brrt command and every Python block of the README runs, in its order."""
+    windows = []
+    monkeypatch.setenv("DISPLAY", ":nowhere")
+    monkeypatch.setattr(drive, "show", lambda run, _: windows.append(run))
     (scenario,) = blocks("toml")
     Path("experiment.toml").write_text(scenario)
     commands = [
@@ -39,6 +46,7 @@ def test_readme_commands_and_code(
         done = brrt(*args)
         # The two seeds of the tour are of one world: that the runs part is its point.
         assert done.code == (1 if "--check" in args else 0), (args, done.err)
+    assert [run.name for run in windows] == ["run.rrd"]
     for code in blocks("python"):
         exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own text
         assert capfd.readouterr().out

@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, McapSink, Memory, Run, Scenario, Sink, forest, read
 from brrt.events import Reason, Table, table_dtype
-from brrt.recording import fading, pages, paths, scene
+from brrt.recording import pages, paths, rerun, scene, sketch
 from brrt.recording.rerun import RerunSink
 
 SQUARES = "squares2d:n=30,seed=3"
@@ -23,6 +23,12 @@ PLANNERS: dict[str, dict[str, Any]] = {
     "lrta-star": {"params": {"epsilon": 2.0, "lookahead": 3, "trials": 2}},
     "a-star": {"params": {"epsilon": 2.0}},
 }
+
+
+@pytest.fixture(autouse=True)
+def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw batch by batch, as a slow planner has it: what is gathered is one batch too."""
+    monkeypatch.setattr(rerun, "_GATHERED", 1)
 
 
 def scenario(planner: str, **values: Any) -> Scenario:
@@ -179,7 +185,7 @@ def test_rewired_edges_light_up(tmp_path: Path) -> None:
     log = record(path, scenario("rrt-star"))
     rewires, q = log[Kind.REWIRE], log[Kind.EDGE]["q"]
     lines = [line for _, row in rows(path, "/world/rewired/start", ":strips") for line in row]
-    assert len(rewires) < fading._IN_FULL
+    assert len(rewires) < sketch.IN_FULL
     wanted = np.stack([q[rewires["parent"]], q[rewires["node"]]], axis=1)
     assert np.array_equal(lines, wanted.astype(np.float32))
 

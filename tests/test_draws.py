@@ -253,15 +253,16 @@ DOCTORED: list[tuple[str, Callable[[], Evidence], set[str]]] = [
     ("sources", lambda: source(3, Source.OTHER_TREE)(evidence("rrt")), set()),
     ("sources", lambda: source(3, Source.INFORMED)(evidence("rrt-star")), {"informed samples"}),
     ("sources", lambda: source(-1, Source.UNIFORM)(informed()), set()),
-    ("sources", lambda: source(3, Source.OTHER_TREE)(evidence("rrt-connect")), set()),
+    ("sources", lambda: source(3, Source.OTHER_TREE)(evidence("rrt-connect")), {
+        "link tries"}),
     ("sources", lambda: promise(draws=Draws(goal_bias=0.0))(evidence("rrt")), set()),
     ("informed samples", lambda: informed(lambda q: q * [1, 0] + [0, 1.0]), {
-        "even informed draws"}),
+        "even informed draws", "steering"}),
     ("goal draws", lambda: log_of(2000, biased(0.15)), set()),
     ("coin tosses", lambda: promise(draws=Draws(coin=0.1))(
         run_of(planner="bi-rrt", params={"turn": "coin", "step": 0.5})), set()),
     ("even draws", lambda: log_of(2000, diagonal), set()),
-    ("even informed draws", lambda: informed(drawn_in), set()),
+    ("even informed draws", lambda: informed(drawn_in), {"steering"}),
     ("random pairs", lambda: favourite_pair(run_of(seed=3, params={"step": 1.5})), {
         "shortcuts", "smoothed"}),
 ]  # fmt: skip

@@ -6,8 +6,10 @@ import resource
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,12 @@ from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, RecordingError, Run, Scenario, read
 from brrt.events import FIELDS, Stage, table_dtype
-from brrt.recording import Memory, canvas, fading, rerun, scene, sketch, trees
-from brrt.recording.rerun import RerunSink, read_rerun, recording_id
+from brrt.recording import CutError, Memory, canvas, rerun, scene, sketch, trees, viewer
+from brrt.recording.columns import event_columns, time_columns, to_arrow
+from brrt.recording.rerun import RerunSink, recording_id
+from brrt.recording.rrd_frames import FRAME
+from brrt.recording.rrd_outline import Outline
+from brrt.recording.rrd_reader import read_rerun
 from brrt.recording.stamp import BLANK
 
 SCENARIOS = {
@@ -30,6 +36,12 @@ SCENARIOS = {
     "3d": Scenario(world="boxes3d:n=60", seed=1, params={"step": 1.5}),
     "unsolved": Scenario(world="spheres3d:n=9", iterations=40),
 }
+
+
+@pytest.fixture(autouse=True)
+def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write batch by batch, as a slow planner has it: what is gathered is one batch too."""
+    monkeypatch.setattr(rerun, "_GATHERED", 1)
 
 
 def write(path: Path, scenario: Scenario, *, batch: int = 50) -> tuple[Run, Events]:
@@ -93,14 +105,14 @@ def test_batches_come_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """Each batch goes on where the one before ended, and the batches can be had again."""
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["2d"])
-    monkeypatch.setattr(rerun, "_BATCH", 70)
+    monkeypatch.setattr("brrt.recording.rrd_reader._EVENTS_AT_ONCE", 20)
     recording = read_rerun(path)
     for _ in range(2):
         seq = 0
         for batch in recording.batches():
             first, kinds = batch.kinds_in_order()
             assert first == seq
-            assert len(kinds) <= 70
+            assert len(kinds) <= 20
             seq += len(kinds)
         assert seq == len(log)
 
@@ -119,7 +131,8 @@ def test_stock_reader_finds_every_field(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["3d"])
     reader = RrdReader(path)
-    assert [store.application_id for store in reader.recordings()] == ["brrt"]
+    (store,) = reader.recordings()
+    assert store.application_id == "brrt 3d 100 x 100 x 100"
     assert len(reader.blueprints()) == 1
     for kind, table in log.tables.items():
         entity = f"/ev/{kind.label}"
@@ -127,6 +140,33 @@ def test_stock_reader_finds_every_field(tmp_path: Path) -> None:
         assert sum(batch.num_rows for batch in batches) == len(table)
         names = {f"brrt.{kind.label}:{field.name}" for field in FIELDS[kind]}
         assert names | {"iteration", "event", "t"} <= set(batches[0].schema.names)
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_columns_are_those_that_rerun_makes(kind: Kind) -> None:
+    """They only come sooner."""
+    table = np.zeros(3, table_dtype(kind, 2))
+    table["seq"] = table["t"] = [1, 5, 7]
+    for field in FIELDS[kind]:
+        if field.type == "q[]":
+            table[field.name] = [np.ones((n, 2)) for n in (1, 4, 2)]
+    values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
+    name = f"brrt.{kind.label}"
+    wanted = rr.DynamicArchetype.columns(name, components=values)
+    for ours, its in zip(event_columns(name, FIELDS[kind], table), wanted, strict=True):
+        assert ours.component_descriptor() == its.component_descriptor()
+        assert ours.as_arrow_array() == its.as_arrow_array()
+    for ours, its in zip(
+        time_columns(table),
+        [
+            rr.TimeColumn("iteration", sequence=table["iteration"]),
+            rr.TimeColumn("event", sequence=table["seq"]),
+            rr.TimeColumn("t", duration=table["t"].astype("m8[ns]")),
+        ],
+        strict=True,
+    ):
+        assert ours.timeline_name() == its.timeline_name()
+        assert ours.as_arrow_array() == its.as_arrow_array()
 
 
 def test_stock_command_reads_it(tmp_path: Path) -> None:
@@ -226,7 +266,7 @@ def test_long_runs_are_thinned_out(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(sketch, "DRAWN_IN_FULL", 100)
     monkeypatch.setattr(sketch, "_CELLS", 64)
     monkeypatch.setattr(sketch, "_KEPT_NODES", 120)
-    monkeypatch.setattr(fading, "_IN_FULL", 50)
+    monkeypatch.setattr(sketch, "IN_FULL", 50)
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["2d"])
     drawn = sum(map(len, column(path, "/world/tree/start", ":strips")))
@@ -298,39 +338,26 @@ def test_run_that_did_not_end(tmp_path: Path) -> None:
     assert same(recording.events(), Events.concat(2, batches))
 
 
-def test_cut_file(tmp_path: Path) -> None:
-    """A cut file is an error that names the remedy, and the remedy saves what was whole."""
+def test_cut_anywhere(tmp_path: Path) -> None:
+    """Wherever a file is cut, what was whole before comes back, then `CutError`."""
     path = tmp_path / "run.rrd"
     _, log = write(path, SCENARIOS["2d"])
-    data = path.read_bytes()
-    (tmp_path / "cut.rrd").write_bytes(data[: len(data) * 2 // 5])
-    with pytest.raises(
-        RecordingError, match=r"cut\.rrd: cut or damaged .*`rerun rrd merge "
-    ) as told:
-        read(tmp_path / "cut.rrd")
-    assert "\n" not in str(told.value)
-    rerun_command(tmp_path, "rrd", "merge", "cut.rrd", "-o", "whole.rrd")
-    saved = read(tmp_path / "whole.rrd")
-    events = saved.events()
-    assert saved.result is None
-    assert 0 < len(events) < len(log)
-    assert same(events, log.until(seq=len(events) - 1))
-
-
-def test_cut_anywhere(tmp_path: Path) -> None:
-    """Wherever a file is cut, it is an error or a shorter log, never a wrong one."""
-    path = tmp_path / "run.rrd"
-    _, log = write(path, SCENARIOS["unsolved"])
-    data = path.read_bytes()
-    for length in [0, 3, 4, 12, 50, *range(100, len(data), len(data) // 40), len(data) - 1]:
+    data, saved = path.read_bytes(), []
+    for length in [0, 3, 4, 12, 50, *range(100, len(data) - 40, len(data) // 40)]:
         path.write_bytes(data[:length])
-        try:
-            found = list(read_rerun(path).batches())
-        except RecordingError as error:
-            assert str(error).startswith(str(path))
-            assert "\n" not in str(error)
-        else:
-            assert all(same(batch, log.until(seq=len(batch) - 1)) for batch in found)
+        batches = list[Events]()
+        with pytest.raises(RecordingError) as told:
+            batches.extend(read_rerun(path).batches())
+        assert str(told.value).startswith(str(path))
+        assert "\n" not in str(told.value)
+        if batches:
+            assert isinstance(told.value, CutError)
+            events = Events.concat(2, batches)
+            assert same(events, log.until(seq=len(events) - 1))
+            saved.append(len(events))
+    assert saved == sorted(saved)
+    assert saved[0] < len(log) / 2
+    assert saved[-1] == len(log)
 
 
 def test_flipped_bits(tmp_path: Path) -> None:
@@ -375,14 +402,15 @@ def test_written_anew_by_other_tools(tmp_path: Path) -> None:
     assert recording.result == recording.metrics().as_dict()
 
 
-def test_missing_events(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_events(tmp_path: Path) -> None:
     """A file that was closed, and lacks events, is an error."""
     path = tmp_path / "run.rrd"
-    write(path, SCENARIOS["unsolved"])
-    load = rerun._load
-    monkeypatch.setattr(rerun, "_load", lambda path: load(path) | {"/ev/edge": []})
-    with pytest.raises(RecordingError, match=r"run\.rrd: damaged: \d+ events were written, 1 are"):
-        read_rerun(path)
+    _, log = write(path, SCENARIOS["unsolved"])
+    _, at, length = Outline.of(path).places[-1]
+    data = path.read_bytes()
+    path.write_bytes(data[: at - FRAME.size] + data[at + length :])
+    with pytest.raises(RecordingError, match=rf"run\.rrd: damaged: {len(log)} events were written"):
+        list(read_rerun(path).batches())
 
 
 def test_foreign_files(tmp_path: Path) -> None:
@@ -452,32 +480,69 @@ def test_disk_that_fills_up(tmp_path: Path) -> None:
 
 def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The run and its file do not mind that someone closes the viewer."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = int(free.getsockname()[1])
-    monkeypatch.setattr("brrt.recording.viewer.PORT", port)
-    monkeypatch.setattr(rr, "spawn", lambda **_: None)
-    viewer = rr.RecordingStream("viewer", send_properties=False)
-    viewer.serve_grpc(grpc_port=port)
+    port = viewer.free_port()
+    monkeypatch.setattr(viewer, "PORT", port)
+    other = rr.RecordingStream("viewer", send_properties=False)
+    other.serve_grpc(grpc_port=port)
     run, memory = Run(SCENARIOS["2d"], batch=50), Memory()
     sink = RerunSink(run.manifest, run.problem.world, path=tmp_path / "run.rrd", view=True)
     for number, batch in enumerate(run.events()):
         sink.write(batch)
         memory.write(batch)
         if number == 3:
-            viewer.disconnect()
+            other.disconnect()
     sink.close(whole=True)
     assert same(read(tmp_path / "run.rrd").events(), memory.events())
 
 
-def test_no_viewer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A viewer that does not start is told in one line."""
-
-    def spawn(**_: object) -> None:
-        raise RuntimeError("Failed to find it.\n\nMore about that.")
-
-    monkeypatch.setattr(rr, "spawn", spawn)
+def test_no_viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A viewer that is not there, or does not start, is told in one line."""
+    monkeypatch.setattr(viewer, "PORT", viewer.free_port())
+    dying = tmp_path / "dying"
+    dying.write_text("#!/bin/sh\necho one; echo 'no screen' >&2; exit 3\n")
+    dying.chmod(0o755)
     run = Run(SCENARIOS["unsolved"])
-    with pytest.raises(RecordingError) as told:
-        RerunSink(run.manifest, run.problem.world, view=True)
-    assert str(told.value) == "cannot open the Rerun viewer: Failed to find it."
+    for program, message in (
+        (None, "there is no Rerun viewer; pip install rerun-sdk brings it"),
+        (dying, "the Rerun viewer ended: no screen"),
+    ):
+        monkeypatch.setattr(viewer, "program", lambda found=program: found)
+        with pytest.raises(RecordingError) as told:
+            RerunSink(run.manifest, run.problem.world, view=True)
+        assert str(told.value) == message
+
+
+@pytest.mark.parametrize("answer", [b"", b"HTTP/1.0 505 No\r\n\r\n"])
+def test_no_viewer_but_something_else(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever listens where a viewer should, we do not wait for it for ever."""
+    monkeypatch.setattr(viewer, "_HELLO_S", 0.2)
+    with socket.create_server((viewer.HERE, 0)) as server:
+        monkeypatch.setattr(viewer, "PORT", server.getsockname()[1])
+        if answer:
+            threading.Thread(target=_answer, args=(server, answer), daemon=True).start()
+        with pytest.raises(RecordingError, match=f"listens at port {viewer.PORT}; end it, or"):
+            viewer.open_viewer()
+
+
+def _answer(server: socket.socket, answer: bytes) -> None:
+    held = []
+    while True:
+        try:
+            connection, _ = server.accept()
+        except OSError:
+            return
+        connection.sendall(answer)
+        held.append(connection)
+
+
+def test_layouts_are_shared_by_what_can_share_them() -> None:
+    """A viewer keeps one layout, and one kind of configuration, for each application."""
+    pairs = set()
+    for path in (Path(__file__).parents[1] / "recordings").glob("*.mcap"):
+        manifest, world = read(path).manifest, read(path).world
+        bounds = (*world.lower, *world.upper)
+        what = (manifest.dim, manifest.dof, manifest.scenario.execute, bounds)
+        for each in (world, replace(world, y_down=True)) if world.dim == 2 else (world,):
+            pairs.add((scene.application(manifest, each), (*what, each.y_down)))
+    names, wholes = zip(*pairs, strict=True)
+    assert len(set(names)) == len(set(wholes)) == len(pairs) > 6

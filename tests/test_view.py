@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,11 +17,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
+from rerun.experimental import ViewerClient
 
 from brrt import Events, Kind, McapSink, Run, Scenario, forest, read
 from brrt.colours import GOAL, OBSTACLE, START
 from brrt.errors import RecordingError
 from brrt.recording import drive, pair, scene
+from brrt.recording import viewer as viewer_program
 from brrt.recording.drive import Cursor
 from brrt.recording.rerun import RerunSink
 
@@ -169,6 +172,55 @@ def test_no_driver(brrt: Callable[..., Result], monkeypatch: pytest.MonkeyPatch)
     assert result.err.startswith("brrt: the Rerun viewer found no graphics driver")
     assert "mesa-vulkan-drivers" in result.err
     assert result.err.count("\n") == 1
+
+
+# --- live, into a window that stays -------------------------------------------------------------
+
+
+@contextmanager
+def window(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let the viewer that is opened be one that nobody sees, and end it afterwards."""
+    program, began = viewer_program.program(), folder / "began"
+    assert program is not None
+    hidden = folder / "hidden"
+    hidden.write_text(
+        f"#!/bin/sh\necho $$ >> {began}\necho noise\n"
+        f'exec {program} --headless --window-size=1000x700 "$@"\n'
+    )
+    hidden.chmod(0o755)
+    monkeypatch.setenv("DISPLAY", ":nowhere")
+    monkeypatch.setattr(viewer_program, "PORT", viewer_program.free_port())
+    monkeypatch.setattr(viewer_program, "program", lambda: str(hidden))
+    try:
+        yield
+    finally:
+        for number in began.read_text().split() if began.exists() else ():
+            os.kill(int(number), signal.SIGTERM)
+
+
+@pytest.mark.usefixtures("viewer")
+def test_runs_share_a_window(
+    brrt: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A world, a run in 2D and one in 3D in one window, each with its own layout.
+
+    The window listens on this machine alone, and says nothing in our place.
+    """
+    psutil = pytest.importorskip("psutil")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with window(tmp_path, monkeypatch):
+        for args in (
+            ["worlds", "show", "circles2d:n=20,seed=2", "--view"],
+            ["plan", "--world", "circles2d:n=20,seed=2", "--no-record", "--view", "--json"],
+            ["plan", "--world", "boxes3d:n=60", "--no-record", "--view", "--json"],
+        ):
+            result = brrt(*args)
+            assert (result.code, "noise" in result.out + result.err) == (0, False), result.err
+        (number,) = (tmp_path / "began").read_text().split()
+        assert set(ports_of(psutil.Process(int(number))).values()) == {"127.0.0.1"}
+        client = ViewerClient.connect(viewer_program.address())
+        names = {each.store_id.split(":")[1] for each in client.get_state().recordings}
+        assert names == {"brrt 2d world 100 x 100", "brrt 2d 100 x 100", "brrt 3d 100 x 100 x 100"}
 
 
 # --- two runs -----------------------------------------------------------------------------------
@@ -321,7 +373,7 @@ def test_web_ports(brrt: Callable[..., Result], tmp_path: Path) -> None:
         result = brrt("view", GOLDEN, "--web", "--port", taken)
         assert (result.code, result.out) == (2, "")
         assert result.err.startswith(f"brrt: port {taken} is taken; choose another one")
-        free = drive.free_port()
+        free = viewer_program.free_port()
         with served(tmp_path, GOLDEN, "--port", free) as (_, second):
             assert urlparse(second).port == free
         with served(tmp_path, GOLDEN) as (_, third):

@@ -226,6 +226,12 @@ class EventLog:
         self._origin = time.perf_counter_ns()
         self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
 
+    def resume(self, t: int) -> None:
+        """Let time go on from that of the last event, `t` in ns, as if none had passed since."""
+        self._origin = time.perf_counter_ns() - t
+        self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
+        self.buffer.state[_LAST_T] = t
+
     @property
     def elapsed_s(self) -> float:
         """Seconds since the log was opened."""

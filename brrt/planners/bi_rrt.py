@@ -1,18 +1,14 @@
 """Bidirectional RRT (Kuffner and LaValle 2000), in the variants that are in use."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from brrt.events import Events
-from brrt.kernels.emit import EventLog
 from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
 from brrt.planners import _bi_rrt
 from brrt.planners.contract import Contract, Draws, Growth
-from brrt.planners.drive import Loop, drive
-from brrt.planners.planner import Planner
+from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -21,7 +17,7 @@ _TURNS = {"alternate": _bi_rrt.ALTERNATE, "smaller": _bi_rrt.SMALLER, "coin": _b
 
 
 @dataclass(frozen=True, slots=True)
-class BiRRT(Planner):
+class BiRRT(TreePlanner):
     """Bidirectional RRT (Kuffner and LaValle 2000): one tree from the start, one from the goal.
 
     In each iteration one tree grows towards a sample, and the other one then heads for the newest
@@ -59,16 +55,14 @@ class BiRRT(Planner):
         draws = Draws(coin=0.5 if self.turn == "coin" else 0.0)
         return Contract(step=step, link=step, draws=draws, growth=growth, stops=True)
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """See `TreePlanner.loop`."""
         step = step_length(self.step, problem)
         options = _bi_rrt.Options(
             step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
             self.always_link,
         )  # fmt: skip
-        return solve(options, problem, rng, log, stop)
+        return loop_of(options, problem, stop)
 
 
 def step_length(step: float | None, problem: Problem, part: float = 0.05) -> float:
@@ -76,22 +70,15 @@ def step_length(step: float | None, problem: Problem, part: float = 0.05) -> flo
     return step or part * problem.world.extent
 
 
-def solve(
-    options: _bi_rrt.Options,
-    problem: Problem,
-    rng: np.random.Generator,
-    log: EventLog,
-    stop: Stop,
-) -> Iterator[Events]:
-    """Plan with any variant; see `Planner.solve`."""
+def loop_of(options: _bi_rrt.Options, problem: Problem, stop: Stop) -> Loop[_bi_rrt.Trees]:
+    """Make the loop of any variant; see `TreePlanner.loop`."""
     roots = np.array([problem.start, problem.goal])
     counts = np.zeros(_bi_rrt.COUNTS, np.int64)
     counts[_bi_rrt.NEWEST + 1] = 1
     trees = _bi_rrt.Trees(
         rooted_forest(roots, RESERVED_NODES), counts, np.zeros(1), scratch=roots.copy()
     )
-    loop = Loop(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
-    return drive(loop, problem, rng, log, stop)
+    return Loop(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
 
 
 def _grown(trees: _bi_rrt.Trees) -> _bi_rrt.Trees:

@@ -1,14 +1,13 @@
 """Bidirectional RRT*: two trees that both choose parents and rewire."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from brrt.events import Events
-from brrt.kernels.emit import EventLog
 from brrt.planners import _star
-from brrt.planners.rrt_star import StarPlanner, solve
+from brrt.planners.drive import Loop
+from brrt.planners.rrt_star import StarPlanner, loop_of
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -32,9 +31,7 @@ class BiRRTStar(StarPlanner):
         options = StarPlanner.options(self, problem)
         return options._replace(link=self.connect_distance or options.step)
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """See `TreePlanner.loop`."""
         roots = np.array([problem.start, problem.goal])
-        return solve(self.options(problem), roots, problem, rng, log, stop)
+        return loop_of(self.options(problem), roots, problem, stop)

@@ -5,9 +5,10 @@ a NamedTuple with the field `counts`. It returns one of the codes below, and goe
 when it is called again.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from abc import abstractmethod
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.emit import EventLog
 from brrt.kernels.jit import prepared
 from brrt.kernels.random import borrow, give_back
+from brrt.planners.planner import Planner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 
@@ -52,46 +54,113 @@ class Loop(Generic[State]):
     draw_limit: int
 
 
-def drive(
-    loop: Loop[Any], problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-) -> Iterator[Events]:
-    """Yield the run's events in batches, from the beginning of planning to its end.
+class Drive:
+    """A loop on its way: it goes on to the end of a budget, and from there with other settings.
 
     Args:
         loop: What plans.
         problem: Robot, world, start and goal.
         rng: Every random draw comes from here.
         log: Numbers and times the events.
-        stop: Budget and interruption.
     """
-    log.reserve(loop.most_events + 4)
-    space, options, counts, draws = problem.space, loop.options, loop.state.counts, borrow(rng)
-    draw_limit = loop.draw_limit if stop.draws is None else min(loop.draw_limit, stop.draws)
-    advance = prepared(loop.advance, loop.state, space, draws, log.buffer, options, 0, 0)
-    log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
-    began = log.elapsed_s
-    status, solved = None, False
-    while status is None and not solved:
-        counted = int(counts[COUNTED])
-        due = stop.reached(counted, log.elapsed_s - began)
-        # Even where the end is due, a loop still says what it has found.
-        limit = counted if due is not None else counted + stop.share(counted)
-        log.tick()
-        result = advance(loop.state, space, draws, log.buffer, options, limit, draw_limit)
-        if result == SOLVED:
-            solved = True
-        elif result == BATCH_FULL:
-            yield log.drain()
-            log.reserve(int(counts[EVENTS]), int(counts[POINTS]))
-        elif result == STATE_FULL:
-            loop.state = loop.grown(loop.state)
-        elif due is None and counts[DRAWS] >= draw_limit:
-            status = Status.ITERATION_LIMIT
-        else:
-            status = due
-    give_back(draws, rng)
-    if status is not None:
-        if log.room < 1:
-            yield log.drain()
-        log.emit(Kind.PHASE, int(counts[DRAWS]), name=Phase.PLAN, status=status)
-    yield log.drain()
+
+    def __init__(
+        self, loop: Loop[Any], problem: Problem, rng: np.random.Generator, log: EventLog
+    ) -> None:
+        log.reserve(loop.most_events + 4)
+        self._loop, self._space, self._rng, self._log = loop, problem.space, rng, log
+        self._draws = borrow(rng)
+        self._advance = prepared(
+            loop.advance, loop.state, self._space, self._draws, log.buffer, loop.options, 0, 0
+        )
+        log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
+        self._began = log.elapsed_s
+        self._solved = False
+
+    @property
+    def counted(self) -> int:
+        """Iterations so far, those that count."""
+        return int(self._loop.state.counts[COUNTED])
+
+    @property
+    def drawn(self) -> int:
+        """Draws so far, whether they count or not."""
+        return int(self._loop.state.counts[DRAWS])
+
+    def go_on(self, stop: Stop) -> Generator[Events, None, Status | None]:
+        """Yield batches of events up to the end of a budget.
+
+        Returns:
+            Why it ended, which nobody has said yet; None where the loop has said itself that
+            planning has ended with a path.
+        """
+        loop, log, counts = self._loop, self._log, self._loop.state.counts
+        draw_limit = loop.draw_limit if stop.draws is None else min(loop.draw_limit, stop.draws)
+        while not self._solved:
+            due = stop.reached(self.counted, log.elapsed_s - self._began)
+            # Even where the end is due, a loop still says what it has found.
+            limit = self.counted if due is not None else self.counted + stop.share(self.counted)
+            log.tick()
+            result = self._advance(
+                loop.state, self._space, self._draws, log.buffer, loop.options, limit, draw_limit
+            )
+            if result == SOLVED:
+                self._solved = True
+            elif result == BATCH_FULL:
+                yield log.drain()
+                log.reserve(int(counts[EVENTS]), int(counts[POINTS]))
+            elif result == STATE_FULL:
+                loop.state = loop.grown(loop.state)
+            elif due is None and counts[DRAWS] >= draw_limit:
+                return Status.ITERATION_LIMIT
+            elif due is not None:
+                return due
+        return None
+
+    def turn(self, loop: Loop[Any], seed: int | None) -> None:
+        """Take the settings of another loop of the same planner, between two iterations.
+
+        Args:
+            loop: Whose settings; its state is left alone.
+            seed: Where the draws come from now; None to go on with those at hand.
+        """
+        self._loop = replace(loop, state=self._loop.state)
+        if self._log.room < loop.most_events + 4:
+            self._log.reserve(len(self._log) + loop.most_events + 4)
+        if seed is not None:
+            self._rng.bit_generator.state = np.random.PCG64(seed).state
+            self._draws = borrow(self._rng)
+
+    def finish(self, stop: Stop) -> Iterator[Events]:
+        """Yield batches of events to the end of the run, which a budget or a path brings."""
+        status = yield from self.go_on(stop)
+        give_back(self._draws, self._rng)
+        if status is not None:
+            if self._log.room < 1:
+                yield self._log.drain()
+            self._log.emit(Kind.PHASE, self.drawn, name=Phase.PLAN, status=status)
+        yield self._log.drain()
+
+
+@dataclass(frozen=True, slots=True)
+class TreePlanner(Planner):
+    """What plans by a compiled loop."""
+
+    @abstractmethod
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """Make the loop at its beginning.
+
+        Args:
+            problem: Robot, world, start and goal.
+            stop: The budget, which decides how much room is made.
+        """
+
+    def open_ended(self) -> Self | None:
+        """Return the planner that goes on where this one ends with a path; None if none can."""
+        return None
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+        yield from Drive(self.loop(problem, stop), problem, rng, log).finish(stop)

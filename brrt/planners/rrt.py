@@ -1,18 +1,14 @@
 """Rapidly-exploring random tree (LaValle 1998)."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from brrt.events import Events
-from brrt.kernels.emit import EventLog
 from brrt.kernels.forest import grown_forest, rooted_forest
 from brrt.planners import _rrt
 from brrt.planners.contract import Contract, Draws, Growth
-from brrt.planners.drive import Loop, drive
-from brrt.planners.planner import Planner
+from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -22,7 +18,7 @@ _DRAWS_PER_ITERATION = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class RRT(Planner):
+class RRT(TreePlanner):
     """Rapidly-exploring random tree (LaValle 1998): one tree, grown from the start.
 
     Each iteration draws a configuration, steers towards it from the nearest node by at most
@@ -53,10 +49,8 @@ class RRT(Planner):
     def _step(self, problem: Problem) -> float:
         return self.step or 0.05 * problem.world.extent
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """See `TreePlanner.loop`."""
         options = _rrt.Options(
             step=self._step(problem),
             goal_bias=self.goal_bias,
@@ -72,10 +66,9 @@ class RRT(Planner):
         )
         tree.counts[_rrt.GOAL_NODE] = -1
         draws = 1 if self.count_failed else _DRAWS_PER_ITERATION
-        loop = Loop(
+        return Loop(
             _rrt.advance, tree, options, _grown, options.slices + 4, draws * stop.iterations
         )
-        return drive(loop, problem, rng, log, stop)
 
 
 def _grown(tree: _rrt.Tree) -> _rrt.Tree:

@@ -1,22 +1,18 @@
 """RRT-Connect (Kuffner and LaValle 2000)."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from brrt.events import Events
-from brrt.kernels.emit import EventLog
 from brrt.planners.bi_rrt import BiRRT
 from brrt.planners.contract import Contract
-from brrt.planners.planner import Planner
+from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
 
 
 @dataclass(frozen=True, slots=True)
-class RRTConnect(Planner):
+class RRTConnect(TreePlanner):
     """RRT-Connect (Kuffner and LaValle 2000): two trees, joined greedily.
 
     One tree makes a step towards a sample, and the other one steps towards the new node until it
@@ -31,11 +27,9 @@ class RRTConnect(Planner):
         """See `Planner.contract`."""
         return self._variant.contract(problem)
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
-        return self._variant.solve(problem, rng, log, stop)
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """See `TreePlanner.loop`."""
+        return self._variant.loop(problem, stop)
 
     @property
     def _variant(self) -> BiRRT:

@@ -1,20 +1,16 @@
 """RRT* (Karaman and Frazzoli 2011), with informed sampling as an option."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from brrt.events import Events
-from brrt.kernels.emit import EventLog
 from brrt.kernels.forest import grown, grown_forest, rooted_forest
 from brrt.planners import _star
 from brrt.planners.bi_rrt import step_length
 from brrt.planners.contract import Contract, Draws, Growth, Near
-from brrt.planners.drive import Loop, drive
-from brrt.planners.planner import Planner
+from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -25,7 +21,7 @@ looks for parents, and with so few of them a tree improves slowly."""
 
 
 @dataclass(frozen=True, slots=True)
-class StarPlanner(Planner):
+class StarPlanner(TreePlanner):
     """What RRT* has in common, with one tree and with two."""
 
     default_iterations: ClassVar[int] = 20_000
@@ -59,6 +55,10 @@ class StarPlanner(Planner):
             stops=options.stop_at_first,
         )
 
+    def open_ended(self) -> Self:
+        """See `TreePlanner.open_ended`."""
+        return replace(self, stop_at_first=False)
+
     def options(self, problem: Problem) -> _star.Options:
         """Return what the loop needs, with lengths resolved for a problem."""
         return _star.Options(
@@ -88,11 +88,9 @@ class RRTStar(StarPlanner):
         """See `StarPlanner.options`."""
         return StarPlanner.options(self, problem)._replace(goal_bias=self.goal_bias)
 
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """See `Planner.solve`."""
-        return solve(self.options(problem), problem.start[None], problem, rng, log, stop)
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
+        """See `TreePlanner.loop`."""
+        return loop_of(self.options(problem), problem.start[None], problem, stop)
 
 
 def proven_gamma(problem: Problem) -> float:
@@ -107,15 +105,10 @@ def proven_gamma(problem: Problem) -> float:
     return float(1.1 * (2 * (1 + 1 / d) * volume / ball) ** (1 / d))
 
 
-def solve(
-    options: _star.Options,
-    roots: np.ndarray,
-    problem: Problem,
-    rng: np.random.Generator,
-    log: EventLog,
-    stop: Stop,
-) -> Iterator[Events]:
-    """Plan with one tree or two, by their roots, shape (trees, dof); see `Planner.solve`."""
+def loop_of(
+    options: _star.Options, roots: np.ndarray, problem: Problem, stop: Stop
+) -> Loop[_star.Star]:
+    """Make the loop for one tree or two, by their roots, shape (trees, dof)."""
     forest = rooted_forest(roots, len(roots) + 1 + len(roots) * (stop.iterations + 1))
     n = len(forest.parent)
     counts = np.zeros(_star.COUNTS, np.int64)
@@ -144,8 +137,7 @@ def solve(
     star.child[: len(roots)] = -1
     star.sibling[: len(roots)] = -1
     star.linked[: len(roots)] = -1
-    loop = Loop(_star.advance, star, options, _grown, 8, stop.iterations)
-    return drive(loop, problem, rng, log, stop)
+    return Loop(_star.advance, star, options, _grown, 8, stop.iterations)
 
 
 def _grown(star: _star.Star) -> _star.Star:

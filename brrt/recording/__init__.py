@@ -1,13 +1,15 @@
 """Recordings: sinks that write them, and `read` for what they wrote."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from brrt.errors import RecordingError
 from brrt.recording.container import MAGIC
-from brrt.recording.mcap_reader import CutError, read_mcap
+from brrt.recording.mcap_reader import read_mcap
 from brrt.recording.mcap_writer import McapSink
 from brrt.recording.memory import Memory
 from brrt.recording.recording import Recording
+from brrt.recording.sound import CutError
 
 _RRD = b"RRF"
 
@@ -25,11 +27,11 @@ def read(path: Path | str) -> Recording:
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     if begin == MAGIC:
-        return read_mcap(path)
+        return replace(read_mcap(path), name=path.name)
     if begin.startswith(_RRD):
-        from brrt.recording.rerun import read_rerun  # noqa: PLC0415 - costs half a second
+        from brrt.recording.rrd_reader import read_rerun  # noqa: PLC0415 - pyarrow is slow to load
 
-        return read_rerun(path)
+        return replace(read_rerun(path), name=path.name)
     raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
 
 

@@ -9,6 +9,9 @@ from brrt.run import Sink
 _BATCHES = 24
 """Batches in waiting, half a megabyte each: so far a planner may be ahead before it waits."""
 
+_IDLE_S = 0.1
+"""After so long without a batch the sink gets an empty one, to look at what it holds back."""
+
 
 class Background:
     """Hands batches to another sink on a thread; kernels run without the GIL meanwhile.
@@ -23,6 +26,7 @@ class Background:
         self._sink = sink
         self._queue: queue.Queue[Events | None] = queue.Queue(_BATCHES)
         self._error: BaseException | None = None
+        self._failed = False
         self._thread = threading.Thread(target=self._work, name="brrt recorder", daemon=True)
         self._thread.start()
 
@@ -43,12 +47,18 @@ class Background:
         self._sink.close(whole=whole)
 
     def _work(self) -> None:
-        while (events := self._queue.get()) is not None:
-            if self._error is None:
+        while (events := self._next()) is not None:
+            if not self._failed:  # a batch behind one that is missing is of no use
                 try:
                     self._sink.write(events)
                 except BaseException as error:  # noqa: BLE001 - raised again on the caller's thread
-                    self._error = error
+                    self._error, self._failed = error, True
+
+    def _next(self) -> Events | None:
+        try:
+            return self._queue.get(timeout=_IDLE_S)
+        except queue.Empty:
+            return Events(0, {})
 
     def _raise(self) -> None:
         if self._error is not None:

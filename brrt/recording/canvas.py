@@ -1,6 +1,7 @@
 """What everything that is drawn into a recording shares: styles, rows in time, plots, the log."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from brrt.worlds.world import World
 
 MOMENT = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
 """When something happened."""
+
+_ROW, _FEW = 1024, 1 << 16
+"""Items in a row where there are many, and what comes before that."""
 
 
 class Canvas:
@@ -33,6 +37,7 @@ class Canvas:
         self.lines: Any = rr.LineStrips2D if flat else rr.LineStrips3D
         self.points: Any = rr.Points2D if flat else rr.Points3D
         self._rec = rec
+        self._styles: dict[str, list[Any]] = {}
         self._news: list[tuple[Any, str]] = []
 
     def places(self, values: Any) -> NDArray[np.float32]:
@@ -42,10 +47,13 @@ class Canvas:
     def style(
         self, entity: str, archetype: Any, colour: Colour, radius: float, layer: float
     ) -> None:
-        """Log what all rows of an entity share; a negative radius is in points of the screen."""
+        """Set what all rows of an entity share; a negative radius is in points of the screen."""
         order = {"draw_order": layer} if self.dim == 2 else {}
-        style = archetype.from_fields(colors=colour, radii=radius, **order)
-        self.still(entity, style)
+        self._share(entity, archetype.from_fields, colors=colour, radii=radius, **order)
+
+    def _share(self, entity: str, make: Callable[..., Any], **values: Any) -> None:
+        """Log what rows share before the first one: most entities never get any."""
+        self._styles.setdefault(entity, []).append(partial(make, **values))
 
     def still(self, entity: str, archetype: Any) -> None:
         """Log what holds at all times."""
@@ -55,26 +63,20 @@ class Canvas:
         self, archetype: Any, rows: int, radius: float, layer: float, colour: int | None = None
     ) -> Any:
         """Return a style for each of some rows, for entities that share theirs with many."""
-        given: dict[str, Any] = {"radii": np.full(rows, radius, np.float32)}
-        if colour is not None:
-            given["colors"] = np.full(rows, colour, np.uint32)
-        if self.dim == 2:
-            given["draw_order"] = np.full(rows, layer, np.float32)
-        return archetype.columns(**given)
+        return _style_columns(archetype, rows, radius, layer if self.dim == 2 else None, colour)
 
     def plot_style(self, entity: str, name: str, colour: Colour) -> None:
         """Name and colour a plot."""
-        line = rr.SeriesLines(names=name.replace("_", " "), colors=colour, widths=1.5)
-        self.still(entity, line)
+        name = name.replace("_", " ")
+        self._share(entity, rr.SeriesLines, names=name, colors=colour, widths=1.5)
 
     def plot_dots(self, entity: str, name: str, colour: Colour) -> None:
         """Show the values of a plot as dots too."""
-        dots = rr.SeriesPoints(colors=colour, marker_sizes=3, names=name)
-        self.still(entity, dots)
+        self._share(entity, rr.SeriesPoints, colors=colour, marker_sizes=3, names=name)
 
     def plot(self, entity: str, rows: Table, values: Any) -> None:
         """Plot a value at each row's time."""
-        self._rec.send_columns(entity, time_columns(rows), rr.Scalars.columns(scalars=values))
+        self._send_columns(entity, rows, rr.Scalars.columns(scalars=values))
 
     def strips(self, places: NDArray[np.float32], lengths: Any) -> Any:
         """Return lines through places, one after the other; see `line_strips`."""
@@ -93,8 +95,7 @@ class Canvas:
         style: Any = (),
     ) -> None:
         """Send so many items at each of some moments, and a style in each row if there is one."""
-        parts = [*columns.partition(counts), *style]
-        self._rec.send_columns(entity, time_columns(moments), parts)
+        self._send_columns(entity, moments, [*columns.partition(counts), *style])
 
     def put_away(self, entity: str, event: Any, place: NDArray[np.float32]) -> None:
         """From an event on, shrink an entity that grows to a place where a mark covers it.
@@ -105,7 +106,7 @@ class Canvas:
         where = np.zeros((1, 3), np.float32)
         where[0, : self.dim] = place
         columns = rr.Transform3D.columns(translation=where, scale=np.full((1, 3), 1e-6, np.float32))
-        self._rec.send_columns(entity, time_columns(moments([event])), columns)
+        self._send_columns(entity, moments([event]), columns)
 
     def tell(self, event: Any, text: str) -> None:
         """Say something in the log at the time of an event."""
@@ -116,13 +117,30 @@ class Canvas:
         if self._news:
             self._news.sort(key=lambda item: int(item[0]["seq"]))
             texts = rr.TextLog.columns(text=[text for _, text in self._news])
-            rows = moments(event for event, _ in self._news)
-            self._rec.send_columns("/log", time_columns(rows), texts)
+            self._send_columns("/log", moments(event for event, _ in self._news), texts)
             self._news.clear()
+
+    def _send_columns(self, entity: str, rows: Table, columns: Any) -> None:
+        for style in self._styles.pop(entity, ()):
+            self.still(entity, style())
+        self._rec.send_columns(entity, time_columns(rows), columns)
+
+
+@lru_cache(maxsize=256)
+def _style_columns(
+    archetype: Any, rows: int, radius: float, layer: float | None, colour: int | None
+) -> Any:
+    """Return what many entities share; making it takes half a millisecond."""
+    given: dict[str, Any] = {"radii": np.full(rows, radius, np.float32)}
+    if colour is not None:
+        given["colors"] = np.full(rows, colour, np.uint32)
+    if layer is not None:
+        given["draw_order"] = np.full(rows, layer, np.float32)
+    return archetype.columns(**given)
 
 
 def growing_rows(first: int, count: int) -> NDArray[np.int64]:
-    """Cut items into rows of about 1 % of what there is, from 1 item up to 1024.
+    """Cut items into rows of about 1 % of what there is, from 1 item up to `_ROW`.
 
     A viewer takes time for each row, and shows a row at once: so the first edges of a tree appear
     one by one, and the many that follow in rows.
@@ -134,9 +152,17 @@ def growing_rows(first: int, count: int) -> NDArray[np.int64]:
     Returns:
         The end of each row, exclusive, counted from `first`; the last is `count`.
     """
-    number = np.arange(first, first + count)
-    row = np.where(number < 1 << 16, 64 * np.log2(number + 1.0), number / 1024).astype(np.int64)
-    return np.append(np.flatnonzero(np.diff(row)) + 1, count)
+    few, end = _first_rows(), first + count
+    begin = few.searchsorted(first, "right")
+    many = np.arange(max(_FEW, (first // _ROW + 1) * _ROW), end, _ROW)
+    return np.concatenate([few[begin : few.searchsorted(end)], many, [end]]) - first
+
+
+@cache
+def _first_rows() -> NDArray[np.int64]:
+    """Where the rows of the first items begin."""
+    row = (64 * np.log2(np.arange(1.0, _FEW + 1))).astype(np.int64)
+    return np.flatnonzero(np.diff(row)) + 1
 
 
 def moments(events: Iterable[Any]) -> Table:
@@ -156,4 +182,4 @@ def merged(tables: Iterable[Table], *fields: str) -> Table:
             part[name] = table[name]
         parts.append(part)
     joined = np.concatenate(parts)
-    return joined[np.argsort(joined["seq"], kind="stable")]
+    return joined.take(np.argsort(joined["seq"], kind="stable"))

@@ -1,7 +1,7 @@
-"""Events as Arrow columns, the way Rerun takes them, and back."""
+"""Events as Arrow columns, the way Rerun takes them; `rrd_reader` undoes that."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow  # noqa: ICN001 - it gets that name below
@@ -12,17 +12,53 @@ from brrt.events import Field, Table
 
 pa: Any = pyarrow  # mypy knows none of its names
 
-TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
-"""The timelines, and the column of the events that each holds."""
+
+class Column(NamedTuple):
+    """A column of times or of components, as `send_columns` takes either.
+
+    Rerun's own classes look at all that they are given: that takes longer than to send it.
+
+    Attributes:
+        name: The timeline, or the component's descriptor.
+        values: An Arrow array with one value a row, of components one list.
+    """
+
+    name: Any
+    values: Any
+
+    def timeline_name(self) -> str:
+        """Return the timeline."""
+        return str(self.name)
+
+    def component_descriptor(self) -> Any:
+        """Return which component it is."""
+        return self.name
+
+    def as_arrow_array(self) -> Any:
+        """Return the values."""
+        return self.values
 
 
-def time_columns(rows: Table) -> list[rr.TimeColumn]:
+def time_columns(rows: Table) -> list[Column]:
     """Return the timelines of events, exact to the nanosecond."""
+    iteration, seq, t = (np.ascontiguousarray(rows[name]) for name in ("iteration", "seq", "t"))
     return [
-        rr.TimeColumn("iteration", sequence=np.ascontiguousarray(rows["iteration"])),
-        rr.TimeColumn("event", sequence=np.ascontiguousarray(rows["seq"])),
-        rr.TimeColumn("t", duration=rows["t"].astype("m8[ns]")),
+        Column("iteration", pa.array(iteration)),
+        Column("event", pa.array(seq)),
+        Column("t", pa.array(t.view("m8[ns]"))),
     ]
+
+
+def event_columns(archetype: str, fields: Iterable[Field], table: Table) -> list[Column]:
+    """Return the fields of events, one component each."""
+    offsets, columns = pa.array(np.arange(len(table) + 1, dtype=np.int32)), []
+    for field in fields:
+        values = to_arrow(field, table[field.name])
+        if field.type != "q[]":  # whose values are lists, one a row, as they come
+            values = pa.ListArray.from_arrays(offsets, values)
+        name = rr.ComponentDescriptor(f"{archetype}:{field.name}", archetype=archetype)
+        columns.append(Column(name, values))
+    return columns
 
 
 def to_arrow(field: Field, values: NDArray[Any]) -> Any:
@@ -35,26 +71,6 @@ def to_arrow(field: Field, values: NDArray[Any]) -> Any:
     if field.type == "q":
         return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
     return pa.array(values)
-
-
-def from_arrow(field: Field, column: Any, dof: int) -> NDArray[Any]:
-    """Undo `to_arrow`; Rerun has wrapped each value into a list.
-
-    Raises:
-        ValueError: There is not one value a row.
-    """
-    flat = column.flatten()
-    if field.type == "q[]":
-        ends = np.cumsum(np.asarray(column.value_lengths()))
-        rows = np.empty(len(ends), object)
-        for i, row in enumerate(np.split(flat.to_numpy(), ends[:-1])):
-            rows[i] = row.reshape(-1, dof)
-        return rows
-    if len(flat) != len(column):
-        raise ValueError(f"{field.name}: {len(flat)} values in {len(column)} rows")
-    if field.type == "q":
-        return np.asarray(flat.flatten().to_numpy().reshape(-1, dof))
-    return np.asarray(flat.to_numpy(zero_copy_only=False))
 
 
 def line_strips(places: NDArray[np.float32], lengths: int | Sequence[int]) -> Any:

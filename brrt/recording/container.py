@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
+
+from brrt.recording.output import Output
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -23,7 +26,7 @@ class Container:
     All methods raise OSError where the file cannot be written.
 
     Args:
-        path: The file; it is overwritten.
+        path: The file; it is overwritten, but not before the first `flush`.
         library: Who writes it.
         level: Of the compression by zstd.
     """
@@ -33,7 +36,9 @@ class Container:
         self._position, self._crc = 0, 0
         self._index = _Summary()
         self._prefix = b""
-        self._file = path.open("wb")
+        self._file = Output(path)
+        self._waiting: list[bytes] = []
+        self._written = 0
         self._write(MAGIC)
         self._record(records.Header("ros2", library))
 
@@ -96,7 +101,7 @@ class Container:
             ),
             {int(c): int(counts[c]) for c in np.flatnonzero(counts)},
         )
-        self._file.flush()
+        self.flush()
 
     def metadata(self, name: str, texts: dict[str, str]) -> None:
         """Write named texts."""
@@ -126,7 +131,24 @@ class Container:
         self._write(summary)
         self._record(records.Footer(start, offsets_at, crc))
         self._write(MAGIC)
-        self._file.flush()
+        self.flush()
+
+    def flush(self) -> None:
+        """Write what there is as far as the operating system; only now the file has its name.
+
+        A disk that does not take all of it gets none of it, and the file is closed: what it holds
+        can be read.
+        """
+        waiting, self._waiting = b"".join(self._waiting), []
+        try:
+            self._file.write(waiting)
+            self._file.appear()
+        except OSError:
+            self._file.cut(self._written)
+            with suppress(OSError):
+                self._file.close()
+            raise
+        self._written = self._position
 
     def close(self) -> None:
         """Close the file as it is."""
@@ -135,7 +157,7 @@ class Container:
     def _write(self, data: bytes) -> None:
         self._crc = zlib.crc32(data, self._crc)
         self._position += len(data)
-        self._file.write(data)
+        self._waiting.append(data)
 
     def _record(self, record: records.McapRecord) -> tuple[int, int]:
         """Write a record; return where it begins and how long it is."""

@@ -6,6 +6,7 @@ exact events stand beside it.
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Status, Table
 from brrt.recording import scene
@@ -71,19 +72,19 @@ class Drawing:
         table, added = events[Kind.REJECT], (events[Kind.EDGE], events[Kind.EXPAND])
         before = self._added + sum(self._rejects.values())
 
-        def plot(entity: str, have: int, some: Table) -> None:
-            ends = growing_rows(have, len(some))
-            rows = some[ends - 1]
+        def plot(entity: str, have: int, some: Table, which: NDArray[np.int64]) -> None:
+            ends = growing_rows(have, len(which))
+            rows = some[which[ends - 1]]
             tried = before + sum(_count_until(rows, each) for each in (table, *added))
             self._canvas.plot(entity, rows, 100 * (have + ends) / tried)
 
         for reason in Reason:
-            rejected = table[table["reason"] == reason]
+            rejected = np.flatnonzero(table["reason"] == reason)
             if len(rejected):
-                plot(_rejected(reason), self._rejects[reason], rejected)
+                plot(_rejected(reason), self._rejects[reason], table, rejected)
                 self._rejects[reason] += len(rejected)
         for some in filter(len, added):
-            plot(_ACCEPTED, self._added, some)
+            plot(_ACCEPTED, self._added, some, np.arange(len(some)))
             self._added += len(some)
 
 

@@ -1,18 +1,14 @@
 """What is shown for a moment: samples, rejected extensions, edges that were rewired."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Table
-from brrt.recording import scene
+from brrt.recording import scene, sketch
 from brrt.recording.canvas import Canvas
-from brrt.recording.sketch import Sketch
-
-_IN_FULL, _STRIDE = 10_000, 16
-"""Items of a kind that are all drawn; then one of so many."""
+from brrt.recording.sketch import Sketch, thinned
 
 _ROW = 16
 """Items in a row; they appear and vanish by rows."""
@@ -39,10 +35,10 @@ class Fading:
 
     def samples(self, table: Table) -> None:
         """Draw samples."""
+        sources = np.ascontiguousarray(table["source"])
         for source in Source:
-            mine = table[table["source"] == source]
             name = source.name.lower()
-            rows = mine[self._shown(mine, f"{name} samples")]
+            rows = table.take(self._shown(table, sources == source, f"{name} samples"))
             if len(rows):
                 points = self._canvas.points.columns(positions=self._canvas.places(rows["q"]))
                 self._canvas.send(f"/world/samples/{name}", rows, _even_rows(len(rows)), points)
@@ -50,18 +46,20 @@ class Fading:
     def rejects(self, table: Table) -> None:
         """Draw from where to where extensions were tried in vain."""
         for reason in Reason:
-            mine = table[table["reason"] == reason]
             name = reason.name.lower()
-            rows = mine[self._shown(mine, f"{name} rejections")]
+            rows = table.take(self._shown(table, table["reason"] == reason, f"{name} rejections"))
             if len(rows):
                 self._send_lines(f"rejected/{name}", rows, self._attempts(rows))
 
-    def rewired(self, tree: str, table: Table, ends: NDArray[np.float32]) -> None:
-        """Highlight the new edges of a tree by their ends, shape (2 n, dim)."""
-        shown = self._shown(table, f"rewired edges of the {tree} tree")
-        if shown.any():
-            kept = ends.reshape(-1, 2, self._canvas.dim)[shown].reshape(-1, self._canvas.dim)
-            self._send_lines(f"rewired/{tree}", table[shown], kept)
+    def rewired(self, tree: int, table: Table) -> None:
+        """Highlight the new edges of a tree."""
+        name, nodes = scene.tree_style(tree)[0], self._sketches[tree]
+        every = np.ones(len(table), np.bool_)
+        rows = table.take(self._shown(table, every, f"rewired edges of the {name} tree"))
+        if len(rows):
+            ends = nodes.places(rows["parent"]), nodes.places(rows["node"])
+            lines = np.stack(ends, axis=1).reshape(-1, self._canvas.dim)
+            self._send_lines(f"rewired/{name}", rows, lines)
 
     def _send_lines(self, name: str, rows: Table, ends: NDArray[np.float32]) -> None:
         strips = self._canvas.strips(ends, 2)
@@ -71,22 +69,21 @@ class Fading:
         """Return where each extension left from and wanted to go, shape (2 n, dim)."""
         dim = self._canvas.dim
         ends = np.full((len(rejects), 2, dim), np.nan, np.float32)
-        for number, sketch in self._sketches.items():
+        for number, nodes in self._sketches.items():
             mine = rejects["tree"] == number
-            ends[mine, 0] = sketch.places(rejects["node"][mine])
+            ends[mine, 0] = nodes.places(rejects["node"][mine])
         ends[:, 1] = self._canvas.places(rejects["q"])
         return ends.reshape(-1, dim)
 
-    def _shown(self, table: Table, what: str) -> NDArray[Any]:
-        """Tell which rows of a table are drawn: not all if there have been many."""
+    def _shown(self, table: Table, mine: NDArray[np.bool_], what: str) -> NDArray[np.int64]:
+        """Return which of a table's rows that are meant are drawn: not all after many."""
+        which = np.flatnonzero(mine)
         first = self._seen.get(what, 0)
-        self._seen[what] = first + len(table)
-        if first <= _IN_FULL < first + len(table):
-            text = f"{what}: beyond {_IN_FULL:,} one in {_STRIDE} is drawn"
-            self._canvas.tell(table[-1], text)
-        number = np.arange(first, first + len(table))
-        shown: NDArray[Any] = (number < _IN_FULL) | (number % _STRIDE == 0)
-        return shown
+        self._seen[what] = end = first + len(which)
+        if first <= sketch.IN_FULL < end:
+            text = f"{what}: beyond {sketch.IN_FULL:,} one in {sketch.STRIDE} is drawn"
+            self._canvas.tell(table[which[-1]], text)
+        return np.asarray(which[thinned(first, len(which))])
 
 
 def _even_rows(count: int) -> NDArray[np.int64]:

@@ -21,6 +21,19 @@ _PIXELS = 640
 """Along the longer side of the image that fills polygons: as fine as a window shows a map."""
 
 
+def application(world: World, what: str) -> str:
+    """Name what shares a layout: a viewer keeps one for each application, and shows the last.
+
+    Args:
+        world: What is seen of it is part of the layout.
+        what: Is drawn in it.
+    """
+    size = " x ".join(f"{side:g}" for side in world.upper - world.lower)
+    corner = ", ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
+    ways = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
+    return " ".join(["brrt", what, size, *ways])
+
+
 def log_world(rec: rr.RecordingStream, world: World) -> None:
     """Draw obstacles and bounds."""
     if world.dim == 2 and not world.y_down:

@@ -3,44 +3,41 @@
 import json
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from io import BytesIO
+from os import SEEK_END
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, Any
 
 import numpy as np
 import zstandard
 from mcap import records
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, table_dtype
-from brrt.recording.cdr import MESSAGE, Layout
+from brrt.recording.cdr import MESSAGE, RECORD_HEAD, Layout
 from brrt.recording.container import MAGIC
+from brrt.recording.mcap_records import FOOTER, opened, parsed, records_of
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
+from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head
 from brrt.scenario import Manifest
-from brrt.worlds.world import World
 
-T = TypeVar("T")
-U = TypeVar("U")
+_ANY, _TIMES = 1 << 20, 256
+"""Of what a chunk unpacks to: bytes in any case, and times its size; events come to 15 times."""
 
-_MAX_RECORD = 1 << 28
-"""Bytes that a record or a chunk may hold: a length that lies must not exhaust the memory."""
+_MOST_DECLARED, _MOST_SCHEMA = 1000, 1 << 20
+"""Schemas and channels in a chunk, and bytes of a schema."""
 
-_FOOTER = 29
-"""Bytes of the footer's record."""
+_MOST_SEARCHED = 4_000_000
+"""Messages that are searched for in chunks without an index: a second or two."""
 
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 _LABELS = {f"/brrt/{kind.label}": kind for kind in Kind}
-
-
-class CutError(RecordingError):
-    """The file ends before its end; what stands before the cut was delivered."""
 
 
 def read_mcap(path: Path) -> Recording:
@@ -51,105 +48,58 @@ def read_mcap(path: Path) -> Recording:
     Raises:
         RecordingError: The file cannot be read, or is not a recording of brrt.
     """
-    manifest: Manifest | None = None
-    with _opened(path) as file:
-        for opcode, data in _records(path, file, check_end=False):
+    texts: Mapping[str, str] | None = None
+    with opened(path) as file:
+        for opcode, data in _head_of(path, file):
             if opcode == Opcode.METADATA:
-                metadata = _parse(path, records.Metadata, data)
-                if metadata.name == RUN:
-                    manifest = _named(path, Manifest.from_strings, metadata.metadata)
-            elif opcode == Opcode.ATTACHMENT and manifest is not None:
-                attachment = _parse(path, records.Attachment, data)
+                metadata = parsed(path, records.Metadata, data)
+                texts = metadata.metadata if metadata.name == RUN else texts
+            elif opcode == Opcode.ATTACHMENT and texts is not None:
+                attachment = parsed(path, records.Attachment, data)
                 if attachment.name == WORLD:
-                    world = _named(path, World.from_json, attachment.data)
-                    result = _result(path)
-                    return Recording(manifest, world, partial(_batches, path, manifest), result)
+                    manifest, world = head(path, texts, attachment.data)
+                    batches = partial(_batches, path, manifest)
+                    return Recording(manifest, world, batches, _result(path))
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
     raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
 
 
-def _named(path: Path, parse: Callable[[T], U], value: T) -> U:
+def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     try:
-        return parse(value)
-    except BrrtError as error:
-        raise RecordingError(f"{path}: {error}") from None
-
-
-def _opened(path: Path) -> IO[bytes]:
-    try:
-        file = path.open("rb")
-        magic = file.read(len(MAGIC))
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror or error}") from None
-    if magic != MAGIC:
-        file.close()
-        raise RecordingError(f"{path}: not an MCAP file")
-    return file
-
-
-def _parse(path: Path, kind: Any, data: bytes) -> Any:
-    try:
-        return kind.read(ReadDataStream(BytesIO(data)))
-    except Exception as error:  # noqa: BLE001 - mcap raises whatever a damaged length leads to
-        raise RecordingError(f"{path}: damaged {kind.__name__}: {error}") from None
-
-
-def _records(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and content of each record of the data section, DataEnd included."""
-    crc = zlib.crc32(MAGIC)
-    while True:
-        head = file.read(9)
-        if len(head) < 9:
-            raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
-        opcode, length = struct.unpack("<BQ", head)
-        if length > _MAX_RECORD:
-            raise RecordingError(
-                f"{path}: damaged near byte {file.tell():,}: a record of {length} bytes"
-            )
-        data = file.read(length)
-        if len(data) < length:
-            raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
-        if opcode == Opcode.DATA_END:
-            stated = _parse(path, records.DataEnd, data).data_section_crc
-            yield opcode, data
-            if check_end:
-                if stated and stated != crc:
-                    raise RecordingError(f"{path}: damaged: the checksum of the data differs")
-                _check_summary(path, file)
-            return
-        crc = zlib.crc32(data, zlib.crc32(head, crc))
-        yield opcode, data
-
-
-def _check_summary(path: Path, file: IO[bytes]) -> None:
-    """See that what follows the data is whole: summary, footer, magic.
-
-    Raises:
-        CutError: It is not all there.
-        RecordingError: It is damaged.
-    """
-    rest = file.read(_MAX_RECORD)
-    if not rest.endswith(MAGIC) or len(rest) < _FOOTER + len(MAGIC):
-        raise CutError(f"{path}: the file is cut at byte {file.tell():,}, behind the last event")
-    # All but the checksum itself, which is the footer's last field.
-    body, crc = rest[: -len(MAGIC) - 4], rest[-len(MAGIC) - 4 : -len(MAGIC)]
-    if zlib.crc32(body) != struct.unpack("<I", crc)[0]:
-        raise RecordingError(f"{path}: damaged: the checksum of the summary differs")
+        yield from records_of(path, file, check_end=False)
+    except CutError as error:
+        raise CutError(f"{error}, ahead of the first event: there is nothing to save") from None
 
 
 def _result(path: Path) -> Mapping[str, Any] | None:
     """Look up the figures at the end of the file; None where it has no whole end."""
-    from mcap.reader import SeekingReader  # noqa: PLC0415 - only here
-
     with path.open("rb") as file:
         try:
-            for record in SeekingReader(file).iter_metadata():
-                if record.name == RESULT:
-                    return {name: json.loads(text) for name, text in record.metadata.items()}
-        except Exception:  # noqa: BLE001 - a cut file fails in many ways; its events are still good
-            return None
+            size = file.seek(-FOOTER - len(MAGIC), SEEK_END)
+            summary = parsed(path, records.Footer, file.read(FOOTER)[9:]).summary_start
+            if not 0 < size - summary <= MOST_BYTES:
+                return None
+            file.seek(summary)
+            for opcode, data in records_of(
+                path, BytesIO(file.read(size - summary)), check_end=False
+            ):
+                if opcode == Opcode.METADATA_INDEX:
+                    index = parsed(path, records.MetadataIndex, data)
+                    if index.name == RESULT and index.length <= MOST_BYTES:
+                        file.seek(index.offset)
+                        return _figures(path, file.read(index.length)[9:])
+        except (OSError, OverflowError, RecordingError):
+            return None  # a cut file fails in many ways; its events are still good
     return None
+
+
+def _figures(path: Path, data: bytes) -> Mapping[str, Any]:
+    texts = parsed(path, records.Metadata, data).metadata
+    try:
+        return {name: json.loads(text) for name, text in texts.items()}
+    except (ValueError, RecursionError):
+        raise RecordingError(f"{path}: damaged: the figures are not JSON") from None
 
 
 @dataclass(slots=True)
@@ -164,23 +114,37 @@ class _Decoder:
 
     path: Path
     manifest: Manifest
-    seq: int = 0
+    numbering: Numbering = field(default_factory=Numbering)
+    searched: int = 0
     schemas: dict[int, str] = field(default_factory=dict)
     channels: dict[int, _Channel] = field(default_factory=dict)
 
     def damaged(self, why: str) -> RecordingError:
-        return RecordingError(f"{self.path}: damaged after event {self.seq - 1:,}: {why}")
+        return RecordingError(
+            f"{self.path}: damaged after event {self.numbering.next - 1:,}: {why}"
+        )
+
+    def index(self, data: bytes) -> tuple[int, NDArray[np.uint64]]:
+        """Read where a channel's messages are in the chunk ahead."""
+        if len(data) < 6:
+            raise self.damaged("an index lies about its size")
+        channel, nbytes = struct.unpack_from("<HI", data)
+        if nbytes != len(data) - 6 or nbytes % _INDEX.itemsize:
+            raise self.damaged("an index lies about its size")
+        return channel, np.frombuffer(data, _INDEX, offset=6)["offset"]
 
     def unpack(self, data: bytes) -> bytes:
         """Decompress a chunk's records and check them."""
-        chunk = _parse(self.path, records.Chunk, data)
+        chunk = parsed(self.path, records.Chunk, data)
         size = chunk.uncompressed_size
         try:
             if chunk.compression == "":
                 raw = chunk.data
             elif chunk.compression != "zstd":
                 raise self.damaged(f"compression {chunk.compression!r} is not brrt's")
-            elif size > _MAX_RECORD or zstandard.frame_content_size(chunk.data) != size:
+            elif size > min(MOST_BYTES, _ANY + _TIMES * len(chunk.data)):
+                raise self.damaged(f"a chunk says that it unpacks to {size:,} bytes")
+            elif zstandard.frame_content_size(chunk.data) != size:
                 raise self.damaged("a chunk lies about its size")
             else:
                 raw = zstandard.ZstdDecompressor().decompress(chunk.data)
@@ -188,50 +152,94 @@ class _Decoder:
             raise self.damaged(str(error)) from None
         if len(raw) != size or zlib.crc32(raw) != chunk.uncompressed_crc:
             raise self.damaged("the checksum of a chunk does not match")
-        self._learn(raw)
         return bytes(raw)
 
-    def _learn(self, raw: bytes) -> None:
-        """Take in the schemas and channels that a chunk begins with."""
-        at = 0
+    def learn(self, raw: bytes) -> int:
+        """Take in the schemas and channels that a chunk begins with; return where they end."""
+        at = declared = 0
         while at + 9 <= len(raw) and raw[at] in (Opcode.SCHEMA, Opcode.CHANNEL):
             length = struct.unpack_from("<Q", raw, at + 1)[0]
-            data = raw[at + 9 : at + 9 + length]
-            if raw[at] == Opcode.SCHEMA:
-                schema = _parse(self.path, records.Schema, data)
-                self.schemas[schema.id] = schema.data.decode(errors="replace")
-            else:
-                channel = _parse(self.path, records.Channel, data)
-                if channel.topic in _LABELS and channel.schema_id in self.schemas:
-                    layout = Layout.parse(self.schemas[channel.schema_id])
-                    self.channels[channel.id] = _Channel(_LABELS[channel.topic], layout)
+            declared += 1
+            if declared > _MOST_DECLARED or length > _MOST_SCHEMA:
+                raise self.damaged("a chunk declares more than any real one")
+            self._declare(raw[at], raw[at + 9 : at + 9 + length])
             at += 9 + length
+        return at
 
-    def events(self, raw: bytes, index: Mapping[int, NDArray[np.uint64]]) -> Events:
-        """Decode the messages that the indexes point at.
+    def _declare(self, opcode: int, data: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = parsed(self.path, records.Schema, data)
+            self.schemas[schema.id] = schema.data.decode(errors="replace")
+            return
+        channel = parsed(self.path, records.Channel, data)
+        if channel.topic not in _LABELS or channel.schema_id not in self.schemas:
+            return
+        try:
+            layout = Layout.parse(self.schemas[channel.schema_id])
+        except (BrrtError, ValueError) as error:
+            raise self.damaged(f"the schema of {channel.topic}: {error}") from None
+        self.channels[channel.id] = _Channel(_LABELS[channel.topic], layout)
+
+    def events(self, chunk: bytes, index: Mapping[int, NDArray[np.uint64]]) -> Events:
+        """Decode the messages of a chunk.
+
+        Args:
+            chunk: Content of a chunk's record.
+            index: Where the messages of each channel are, as far as its indexes say.
 
         Raises:
-            RecordingError: An index or a record does not hold what it says.
+            RecordingError: The chunk, an index or a message does not hold what it says.
         """
-        tables = {}
+        raw = self.unpack(chunk)
+        begin = self.learn(raw)
+        tables, known = {}, begin
         for number, offsets in index.items():
             channel = self.channels.get(number)
             if channel is not None and len(offsets):
+                if channel.kind in tables:
+                    raise self.damaged(f"two channels hold events of kind {channel.kind.label}")
                 tables[channel.kind] = self._table(raw, number, channel, offsets)
+                known += self._sizes(raw, channel, offsets)
+        if known < len(raw):
+            # A file that was cut between a chunk and its indexes, or written anew without them.
+            index = self._found(raw, begin)
+            tables = {
+                channel.kind: self._table(raw, number, channel, offsets)
+                for number, offsets in index.items()
+                if (channel := self.channels.get(number)) is not None
+            }
         events = Events(self.manifest.dof, dict(sorted(tables.items())))
-        n = len(events)
-        seqs = np.concatenate([t["seq"] for t in tables.values()]) if tables else np.empty(0)
-        if n and not (seqs.min() == self.seq and seqs.max() == self.seq + n - 1):
-            raise self.damaged("events are missing")
-        self.seq += n
+        try:
+            self.numbering.take(events)
+        except BrrtError as error:
+            raise self.damaged(str(error)) from None
         return events
+
+    def _sizes(self, raw: bytes, channel: _Channel, offsets: NDArray[np.uint64]) -> int:
+        """Bytes of messages, of which `_table` has seen that they are some."""
+        if channel.layout.ragged is None:
+            return len(offsets) * channel.layout.record.itemsize
+        return sum(9 + int(struct.unpack_from("<Q", raw, int(at) + 1)[0]) for at in offsets)
+
+    def _found(self, raw: bytes, at: int) -> dict[int, NDArray[np.uint64]]:
+        """Index the messages of a chunk by going from one to the next."""
+        found: dict[int, list[int]] = {}
+        while at < len(raw):
+            if at + RECORD_HEAD.itemsize > len(raw) or self.searched > _MOST_SEARCHED:
+                raise self.damaged("a chunk without its index")
+            opcode, length, channel = struct.unpack_from("<BQH", raw, at)
+            if opcode == MESSAGE:
+                found.setdefault(channel, []).append(at)
+            at += 9 + length
+            self.searched += 1
+        return {channel: np.array(places, np.uint64) for channel, places in found.items()}
 
     def _table(
         self, raw: bytes, number: int, channel: _Channel, offsets: NDArray[np.uint64]
     ) -> NDArray[np.void]:
         layout, size = channel.layout, channel.layout.record.itemsize
         places = len(raw) - size + 1
-        if places <= 0 or int(offsets.max()) >= places:
+        if len(offsets) * size > len(raw) or int(offsets.max()) >= places:
             raise self.damaged("an index points out of its chunk")
         window = np.ndarray((places,), f"V{size}", raw, strides=(1,))
         block = window[offsets].view(layout.record)
@@ -248,8 +256,8 @@ class _Decoder:
             if name == layout.ragged:
                 for i, offset in enumerate(offsets):
                     table[name][i] = self._sequence(raw, int(offset), layout, block[name][i])
-            elif name not in (block.dtype.names or ()):
-                raise self.damaged(f"the field {name!r} of {channel.kind.label} is missing")
+            elif not _fits(block.dtype, table.dtype, name):
+                raise self.damaged(f"{channel.kind.label} has no such field {name!r} as it needs")
             else:
                 table[name] = block[name]
         return table
@@ -261,21 +269,37 @@ class _Decoder:
         return np.frombuffer(raw, "<f8", int(count), begin).reshape(-1, dof).copy()
 
 
+def _fits(there: np.dtype[Any], wanted: np.dtype[Any], name: str) -> bool:
+    """Whether a field is there with as many numbers, and of a type that holds no others."""
+    if name not in (there.names or ()):
+        return False
+    a, b = there[name], wanted[name]
+    return a.shape == b.shape and np.can_cast(a.base, b.base)
+
+
 def _batches(path: Path, manifest: Manifest) -> Iterator[Events]:
     """Yield the events of each chunk."""
-    decoder = _Decoder(path, manifest)
+    decoder, figures = _Decoder(path, manifest), None
     chunk: bytes | None = None
     index: dict[int, NDArray[np.uint64]] = {}
-    with _opened(path) as file:
-        for opcode, data in _records(path, file, check_end=True):
-            if opcode == Opcode.MESSAGE_INDEX:
-                channel, nbytes = struct.unpack_from("<HI", data)
-                if nbytes != len(data) - 6 or nbytes % _INDEX.itemsize:
-                    raise decoder.damaged("an index lies about its size")
-                index[channel] = np.frombuffer(data, _INDEX, offset=6)["offset"]
-                continue
+    with opened(path) as file:
+        try:
+            for opcode, data in records_of(path, file, check_end=True):
+                if opcode == Opcode.MESSAGE_INDEX:
+                    channel, offsets = decoder.index(data)
+                    index[channel] = offsets
+                    continue
+                if chunk is not None:
+                    yield decoder.events(chunk, index)
+                    chunk, index = None, {}
+                if opcode == Opcode.CHUNK:
+                    chunk = data
+                elif opcode == Opcode.MESSAGE:
+                    raise decoder.damaged("a message outside of a chunk, as brrt writes none")
+                elif opcode == Opcode.METADATA:
+                    metadata = parsed(path, records.Metadata, data)
+                    figures = _figures(path, data) if metadata.name == RESULT else figures
+        except CutError as error:
             if chunk is not None:
                 yield decoder.events(chunk, index)
-                chunk, index = None, {}
-            if opcode == Opcode.CHUNK:
-                chunk = decoder.unpack(data)
+            raise CutError(str(error), figures) from None

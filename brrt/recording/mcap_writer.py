@@ -1,7 +1,6 @@
 """Events into MCAP: the ros2 profile, one topic a kind, a chunk of messages in one numpy pass."""
 
 import json
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +14,7 @@ from brrt.errors import RecordingError
 from brrt.events import FIELDS, Events, Kind
 from brrt.recording.cdr import Layout, definition
 from brrt.recording.container import Container
+from brrt.recording.gathering import Gathering
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -23,7 +23,8 @@ RUN, RESULT, WORLD = "brrt.run", "brrt.result", "world.json"
 """Names of the metadata and of the attachment."""
 
 _CHUNK_EVENTS = 8000
-_CHUNK_SECONDS = 1.0
+_CHUNK_SECONDS = 0.5
+"""Half of what is promised: the rest is for the writing, on a machine that has more to do."""
 
 
 def channel_of(kind: Kind) -> int:
@@ -50,36 +51,37 @@ class McapSink:
         self._path, self._epoch = Path(path), manifest.epoch_ns
         self._metrics = Metrics(manifest)
         self._layouts = {kind: Layout.parse(definition(kind, manifest.dof)) for kind in Kind}
-        self._pending: list[Events] = []
-        self._dof, self._pending_since = manifest.dof, 0.0
+        self._gathering = Gathering(manifest.dof, _CHUNK_EVENTS, _CHUNK_SECONDS)
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
         try:
             self._file = Container(self._path, library)
-        except OSError as error:
-            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
-        self._file.declare(*_schemas(manifest.dof), *_channels())
-        with self._failing():
+            self._file.declare(*_schemas(manifest.dof), *_channels())
             self._file.metadata(RUN, manifest.to_strings())
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
+            self._file.flush()
+        except OSError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
 
     def write(self, events: Events) -> None:
         """Take a batch; small ones are gathered into one chunk."""
-        if not len(events):
-            return
-        now = time.monotonic()
-        if not self._pending:
-            self._pending_since = now
-        self._pending.append(events)
-        late = now - self._pending_since > _CHUNK_SECONDS
-        if late or sum(map(len, self._pending)) >= _CHUNK_EVENTS:
-            self._flush_chunk()
+        self._write_chunk(self._gathering.add(events))
+
+    def annotate(self, name: str, texts: dict[str, str]) -> None:
+        """Keep named texts in the file, behind the events so far.
+
+        Raises:
+            RecordingError: The disk does not take them.
+        """
+        self._write_chunk(self._gathering.take())
+        with self._failing():
+            self._file.metadata(name, texts)
 
     def close(self, *, whole: bool) -> None:
         """Write what is pending, the figures, the index and the footer."""
         if self._file.closed:
             return
         try:
-            self._flush_chunk()
+            self._write_chunk(self._gathering.take())
             with self._failing():
                 if whole:
                     figures = self._metrics.as_dict()
@@ -98,15 +100,12 @@ class McapSink:
         except OSError as error:
             raise RecordingError(
                 f"cannot go on writing {self._path}: {error.strerror or error}; "
-                f"what was written before can be replayed with --partial"
+                f"what was written before is whole: replay it with --partial, or see brrt recover"
             ) from None
 
-    def _flush_chunk(self) -> None:
-        if not self._pending:
+    def _write_chunk(self, events: Events | None) -> None:
+        if events is None:
             return
-        pending = self._pending
-        events = pending[0] if len(pending) == 1 else Events.concat(self._dof, pending)
-        self._pending = []
         self._metrics.write(events)
         raw, times, channels, offsets = self._encode(events)
         with self._failing():

@@ -6,11 +6,8 @@ from brrt.events import Events, Kind, Table
 from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows
 from brrt.recording.paths import draw_bodies
-from brrt.recording.sketch import DRAWN_IN_FULL, Thinning
+from brrt.recording.sketch import DRAWN_IN_FULL, Thinning, thinned
 from brrt.scenario import Manifest
-
-_IN_FULL, _STRIDE = 10_000, 16
-"""Moves after each of which the robot is shown; then after one of so many."""
 
 
 class Moves:
@@ -36,10 +33,8 @@ class Moves:
         if len(table):
             before = self._thinning.count
             places = self._draw_trace(table)
-            number = np.arange(before, before + len(table))
-            shown = (number < _IN_FULL) | (number % _STRIDE == 0)
-            shown[-1] = True
-            rows, ones = table[shown], np.ones(shown.sum(), np.int64)
+            shown = np.union1d(thinned(before, len(table)), [len(table) - 1])
+            rows, ones = table[shown], np.ones(len(shown), np.int64)
             points = self._canvas.points.columns(positions=places[shown])
             self._canvas.send_rows(scene.ROBOT_ENTITY, rows, ones, points)
             if self._canvas.robot.outline(table["q"][0]):

@@ -3,7 +3,8 @@
 Of an entity that changes, a viewer shows the newest row up to the cursor, so that a page is right
 wherever the cursor goes. What that costs is bounded in three ways:
 
-- There are at most `_MOST_PAGES`: when they are full, each takes twice as many items.
+- There are at most `_MOST_PAGES`: when they are full, each takes twice as many items. More would
+  not help: by the time a row pays, something has changed on nearly every page.
 - Changed pages are logged when `_PER_CHANGE` items a change have been saved up for the ones logged
   before, and, once there have been many changes, a fraction of that. So the rows stay in proportion
   to the events, and the picture lags behind by 3 % or so of its changes; by none at first.
@@ -13,7 +14,7 @@ wherever the cursor goes. What that costs is bounded in three ways:
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,9 @@ from numpy.typing import NDArray
 from brrt.events import Table
 from brrt.recording.canvas import MOMENT, Canvas, moments
 
-_MOST_PAGES, _FIRST_SIZE = 128, 32
-"""Pages at most, and items on a page as long as that suffices."""
+_MOST_PAGES, _FIRST_SIZE = 64, 32
+"""Pages at most, and items on a page as long as that suffices. With 100,000 items on them, a row
+and the one before it are still within the 64 kB in which compression finds what comes again."""
 
 _PER_CHANGE, _MANY_CHANGES, _PER_CHANGE_OF_MANY = 16, 100_000, 4
 """Items that may be logged for each change; and beyond so many changes."""
@@ -35,6 +37,22 @@ _SEND_S = 0.5
 
 Items = NDArray[Any]
 Builder = Callable[[Items], Any]
+
+
+class _Rows(NamedTuple):
+    """A row of each of some pages, taken at one moment.
+
+    Attributes:
+        moment: When.
+        pages: Their numbers, shape (n,).
+        counts: Items on each, shape (n,).
+        items: All of them, one page after the other.
+    """
+
+    moment: Any
+    pages: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    items: NDArray[np.void]
 
 
 class Pages:
@@ -61,7 +79,7 @@ class Pages:
         self._items, self._count, self._size = empty, 0, _FIRST_SIZE
         self._dirty = np.zeros(_MOST_PAGES, np.bool_)
         self._sent = time.monotonic()
-        self._rows: dict[int, tuple[list[Any], list[Items]]] = {}
+        self._rows: list[_Rows] = []
         self._changes, self._wait = 0, 1
         self._latest: Any = None
 
@@ -116,24 +134,39 @@ class Pages:
 
     def _log(self) -> None:
         """Take a row of each page that changed."""
-        cost = 0
-        for page in np.flatnonzero(self._dirty).tolist():
-            content = self._items[page * self._size : min((page + 1) * self._size, self._count)]
-            times, contents = self._rows.setdefault(page, ([], []))
-            times.append(self._latest)
-            contents.append(content.copy())
-            cost += len(content)
+        pages = np.flatnonzero(self._dirty)
+        counts = (self._count - pages * self._size).clip(0, self._size)
+        items = self._items.view(f"V{self._items.itemsize}")  # fields would make it slow
+        content = items[_spans(pages * self._size, counts)]
+        self._rows.append(_Rows(self._latest, pages, counts, content))
         self._dirty[:] = False
         per_change = _PER_CHANGE if self._changes < _MANY_CHANGES else _PER_CHANGE_OF_MANY
-        self._wait = max(1, cost // per_change, self._changes // _MOST_UNSEEN)
+        self._wait = max(1, len(content) // per_change, self._changes // _MOST_UNSEEN)
 
     def _send(self) -> None:
-        for page, (times, contents) in self._rows.items():
-            entity = f"{self._entity}/{page:03d}"
-            counts = np.array([len(content) for content in contents])
-            columns = self._columns(np.concatenate(contents))
-            self._canvas.send_rows(
-                entity, np.array(times, MOMENT), counts, columns, style=self._style(len(counts))
+        if self._rows:
+            pages, counts, items = (
+                np.concatenate(parts)
+                for parts in zip(*[(r.pages, r.counts, r.items) for r in self._rows], strict=True)
             )
+            times = np.repeat(
+                np.array([r.moment for r in self._rows], MOMENT), [len(r.pages) for r in self._rows]
+            )
+            order, begins = np.argsort(pages, kind="stable"), np.cumsum(counts) - counts
+            for mine in np.split(order, np.flatnonzero(np.diff(pages[order])) + 1):
+                content = items[_spans(begins[mine], counts[mine])].view(self._items.dtype)
+                self._canvas.send_rows(
+                    f"{self._entity}/{pages[mine[0]]:03d}",
+                    times[mine],
+                    counts[mine],
+                    self._columns(content),
+                    style=self._style(len(mine)),
+                )
         self._rows.clear()
         self._sent = time.monotonic()
+
+
+def _spans(begins: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the numbers of spans, so many from each beginning, one span after the other."""
+    ends = np.cumsum(counts)
+    return np.arange(counts.sum()) + np.repeat(begins - ends + counts, counts)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brrt.colours import Colour
 from brrt.events import Events, Kind
-from brrt.recording import landscape, scene, viewer
+from brrt.recording import landscape, scene
 from brrt.recording.canvas import moments
 from brrt.recording.columns import time_columns
 from brrt.recording.drawing import Drawing
@@ -23,8 +23,6 @@ from brrt.replay.diff import Difference, first_difference
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-_APPLICATION = f"{viewer.APPLICATION} pair"
-"""A viewer keeps one layout for each application."""
 MARK: Colour = (255, 64, 216)
 """Where two runs part; like nothing else in the picture."""
 LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
@@ -72,7 +70,7 @@ def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
     """
     difference = first_difference([left.events], [right.events])
     name = f"{recording_id(left.manifest)}+{recording_id(right.manifest)}"
-    rec = new_stream(name, _APPLICATION)
+    rec = new_stream(name, "brrt pair")  # in a window of its own
     with filled(rec, _layout(left, right), path, view=False):
         for letter, side, colour in zip("AB", (left, right), LINES, strict=True):
             branch: Any = _Branch(rec, f"/{letter}", letter, colour)

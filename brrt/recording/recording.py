@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from brrt.events import Events
+from brrt.events import Events, Kind
 from brrt.replay.account import account
 from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
+from brrt.replay.moment import Moment, instant
 from brrt.robots import Robot
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -22,16 +23,42 @@ class Recording:
         world: The world it ran in.
         batches: Call it for the events, in batches, in order.
         result: The figures that the writer found at the end; None if it did not get there.
+        counts: Events of each kind, as the end of the file has them; None if it does not.
+        name: Of the file, without its folder.
     """
 
     manifest: Manifest
     world: World
     batches: Callable[[], Iterator[Events]]
     result: Mapping[str, Any] | None
+    counts: Mapping[Kind, int] | None = None
+    name: str = ""
 
     def events(self) -> Events:
         """Return the whole log at once."""
         return Events.concat(self.manifest.dof, self.batches())
+
+    def at(
+        self,
+        *,
+        time: float | None = None,
+        event: int | None = None,
+        iteration: int | None = None,
+    ) -> Moment:
+        """Return the run as it stood at an instant, as `brrt replay --at` has it; or at its end.
+
+        Nothing is read until something of it is asked for, and then no further than the instant.
+
+        Args:
+            time: Seconds since the run began.
+            event: After this event.
+            iteration: After this iteration.
+
+        Raises:
+            BrrtError: More than one is given, or it is no number from 0 on.
+        """
+        limits = instant(time=time, event=event, iteration=iteration)
+        return Moment(self.manifest, self.world, self.batches, limits)
 
     def robot(self) -> Robot:
         """Make the robot as it was, settled in the world."""

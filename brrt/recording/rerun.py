@@ -1,34 +1,33 @@
-"""Events into Rerun and back: exact columns to replay from, and a picture beside them."""
+"""Events into Rerun: exact columns to replay from, and a picture beside them."""
 
-import hashlib
 import json
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rerun as rr
-from rerun.chunk import RrdReader
 
-from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Kind, Table, table_dtype
+from brrt.errors import RecordingError
+from brrt.events import FIELDS, Events
 from brrt.recording import viewer
-from brrt.recording.columns import TIMELINES, from_arrow, time_columns, to_arrow
+from brrt.recording.columns import event_columns, time_columns
 from brrt.recording.drain import Drain
 from brrt.recording.drawing import Drawing
-from brrt.recording.recording import Recording
-from brrt.recording.scene import blueprint, document
-from brrt.recording.stamp import BLANK, is_damaged, stamp
+from brrt.recording.gathering import Gathering
+from brrt.recording.rrd_outline import CHECK, END, EVENTS, MANIFEST, OURS, WORLD, archetype
+from brrt.recording.scene import application, blueprint, document
+from brrt.recording.stamp import WRITTEN, stamp
 from brrt.recording.stream import connect, new_stream
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-_MAGIC = b"RRF2"
-_EVENTS, _OURS = "/ev/", "/brrt/"
-_MANIFEST, _WORLD, _END = "/brrt/manifest", "/brrt/world", "/brrt/end"
-_BATCH = 1 << 16
+_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.5, 0.1
+"""Events that are written together, and for how long one may wait for that: on its way to a file
+alone, and to somebody who is looking."""
+
+_WINDOW = 1 << 16
+"""How many bytes back the compression of Rerun's files (LZ4) finds what comes again. Each column of
+a chunk begins with the same offsets, 4 bytes a row, which so take no space but in the first one."""
 
 
 class RerunSink:
@@ -60,10 +59,13 @@ class RerunSink:
         self._manifest, self._view = manifest, view
         self._path = None if path is None else Path(path)
         self._metrics = Metrics(manifest)
+        live = view or embed is not None
+        self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if live else _FILE_S)
+        self._chunk = max(256, _WINDOW // (8 * manifest.dof + 5))
         self._layout = blueprint(manifest, world)
-        self._rec: Any = new_stream(recording_id(manifest))
+        self._rec: Any = new_stream(recording_id(manifest), application(manifest, world))
         if view:
-            viewer.open_viewer(self._rec)
+            viewer.open_viewer()
         self._drain = None if self._path is None else Drain(self._path)
         try:
             if embed is None:
@@ -79,19 +81,17 @@ class RerunSink:
             raise
 
     def write(self, events: Events) -> None:
-        """Write and draw a batch.
+        """Take a batch; small ones are gathered, then written and drawn.
 
         Raises:
             RecordingError: The disk is full, or something else is wrong with the file.
         """
-        for kind, table in events.tables.items():
-            entity = f"{_EVENTS}{kind.label}"
-            values = {field.name: to_arrow(field, table[field.name]) for field in FIELDS[kind]}
-            components = rr.DynamicArchetype.columns(_archetype(entity), components=values)
-            self._rec.send_columns(entity, time_columns(table), components)
-        self._drawing.write(events)
-        self._metrics.write(events)
-        self._flush()
+        self._write(self._gathering.add(events))
+
+    def annotate(self, name: str, texts: dict[str, str]) -> None:
+        """Keep named texts in the file, behind the events so far."""
+        self._write(self._gathering.take())
+        self._write_texts(f"{OURS}{name.rpartition('.')[2]}", texts)
 
     def close(self, *, whole: bool) -> None:
         """Write how it ended, and let go of file and viewer.
@@ -102,18 +102,36 @@ class RerunSink:
         if self._rec is None:
             return
         try:
+            self._write(self._gathering.take())
             self._drawing.close()
             figures = self._metrics.as_dict()
-            end = {"events": str(figures["events"]), "stamp": BLANK}
+            end = {"events": str(figures["events"]), "stamp": WRITTEN}
             if whole:
                 end["result"] = json.dumps(figures)
                 self._document(document(self._manifest, figures))
-            self._write_texts(_END, end)
+            self._write_texts(END, end)
             if self._view:  # the file is to open at its beginning, though the viewer is at the end
                 self._rec.send_blueprint(self._layout, make_active=False)
             self._flush()
         finally:
             self._disconnect()
+
+    def _write(self, events: Events | None) -> None:
+        if events is None:
+            return
+        chunks = [
+            (kind, table[first : first + self._chunk])
+            for kind, table in events.tables.items()
+            for first in range(0, len(table), self._chunk)
+        ]
+        # By their first events, so that of a file that is cut little goes for want of a kind.
+        for kind, table in sorted(chunks, key=lambda chunk: int(chunk[1]["seq"][0])):
+            entity = f"{EVENTS}{kind.label}"
+            columns = event_columns(archetype(entity), FIELDS[kind], table)
+            self._rec.send_columns(entity, time_columns(table), columns)
+        self._drawing.write(events)
+        self._metrics.write(events)
+        self._flush()
 
     def _disconnect(self) -> None:
         try:
@@ -130,15 +148,15 @@ class RerunSink:
 
     def _write_head(self, world: World) -> None:
         texts = {
-            _MANIFEST: json.dumps(self._manifest.to_strings()),
-            _WORLD: world.to_json(),
+            MANIFEST: json.dumps(self._manifest.to_strings()),
+            WORLD: world.to_json(),
         }
         for entity, text in texts.items():
             self._write_texts(entity, {"json": text})
         self._document(document(self._manifest))
 
     def _write_texts(self, entity: str, texts: dict[str, str]) -> None:
-        value = rr.DynamicArchetype(_archetype(entity), components=texts)
+        value = rr.DynamicArchetype(archetype(entity), components=texts)
         self._rec.log(entity, value, static=True)
 
     def _document(self, text: str) -> None:
@@ -146,7 +164,17 @@ class RerunSink:
         self._rec.log("/run", markdown, static=True)
 
     def _flush(self) -> None:
-        """Hand everything on now: a killed run leaves all but its last batch."""
+        """Hand everything on now: a killed run leaves all but its last batch.
+
+        Behind it comes a checksum of the file so far, since the format has none.
+        """
+        self._hand_on()
+        if self._drain is not None:
+            text = {"bytes": str(self._drain.size), "crc32": str(self._drain.crc)}
+            self._write_texts(CHECK, text)
+            self._hand_on()
+
+    def _hand_on(self) -> None:
         try:
             self._rec.flush()
         except RuntimeError:
@@ -154,124 +182,9 @@ class RerunSink:
                 raise
             # Someone has closed the viewer. The file, which has its own way out, goes on.
         if self._drain is not None:
-            self._drain.check()
+            self._drain.settle()
 
 
 def recording_id(manifest: Manifest) -> str:
     """Name a recording: equal for runs that are the same in everything, the clock included."""
-    digest = hashlib.sha256(json.dumps(manifest.to_strings()).encode()).hexdigest()
-    return f"{manifest.scenario.planner}-{digest[:16]}"
-
-
-def _archetype(entity: str) -> str:
-    """`brrt.edge` for `/ev/edge`."""
-    return f"brrt.{entity.rsplit('/', 1)[-1]}"
-
-
-def read_rerun(path: Path) -> Recording:
-    """Read a recording that `RerunSink` wrote; its events are held in memory.
-
-    Of a run that was killed, the events up to the first one that is missing are there.
-
-    Raises:
-        RecordingError: The file cannot be read, is cut or damaged, or is no recording of brrt.
-    """
-    chunks = _load(path)
-    if _MANIFEST not in chunks:
-        raise RecordingError(f"{path}: a Rerun file, but not a recording of brrt (no {_MANIFEST})")
-    try:
-        return _recording(chunks)
-    except BrrtError as error:
-        raise RecordingError(f"{path}: {error}") from None
-    except Exception as error:  # noqa: BLE001 - whatever damaged data lead to
-        raise RecordingError(f"{path}: damaged: {error!r}") from None
-
-
-def _load(path: Path) -> dict[str, list[Any]]:
-    """Read the record batches of the entities that are not for the eye."""
-    try:
-        with path.open("rb") as file:
-            magic = file.read(len(_MAGIC))
-        damaged = magic == _MAGIC and is_damaged(path)
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror or error}") from None
-    if magic != _MAGIC:
-        raise RecordingError(f"{path}: not a Rerun recording")
-    if damaged:
-        raise RecordingError(f"{path}: damaged: the checksum does not match")
-    found: dict[str, list[Any]] = {}
-    try:
-        with warnings.catch_warnings():
-            # The file of a killed run has no footer; Rerun then warns of an old format.
-            warnings.simplefilter("ignore")
-            for chunk in RrdReader(path).stream():
-                if chunk.entity_path.startswith((_EVENTS, _OURS)):
-                    found.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
-    except Exception as error:  # noqa: BLE001 - whatever a damaged file leads Rerun to
-        reason = str(error).replace(f"Failed to read RRD file at {path}: ", "").splitlines()[0]
-        raise RecordingError(
-            f"{path}: cut or damaged ({reason}); "
-            f"`rerun rrd merge {path} -o whole.rrd` saves what is whole"
-        ) from None
-    return found
-
-
-def _recording(chunks: dict[str, list[Any]]) -> Recording:
-    texts = {entity: _text(chunks, entity, "json") or "" for entity in (_MANIFEST, _WORLD)}
-    manifest = Manifest.from_strings(json.loads(texts[_MANIFEST]))
-    world = World.from_json(texts[_WORLD])
-    events = _events(chunks, manifest.dof)
-    stated, result = (_text(chunks, _END, name) for name in ("events", "result"))
-    if stated is not None and int(stated) != len(events):
-        raise BrrtError(f"damaged: {stated} events were written, {len(events)} are there")
-    figures = None if result is None else json.loads(result)
-    return Recording(manifest, world, lambda: _batches(events), figures)
-
-
-def _text(chunks: dict[str, list[Any]], entity: str, name: str) -> str | None:
-    for batch in chunks.get(entity, ()):
-        column = f"{_archetype(entity)}:{name}"
-        if column in batch.schema.names:
-            return str(batch.column(column)[0].as_py()[0])
-    return None
-
-
-def _events(chunks: dict[str, list[Any]], dof: int) -> Events:
-    """Gather the events, as far as none is missing."""
-    tables = {}
-    for kind in Kind:
-        batches = chunks.get(f"{_EVENTS}{kind.label}", [])
-        if batches:
-            tables[kind] = _table(kind, dof, batches)
-    total = sum(map(len, tables.values()))
-    present = np.zeros(total + 1, np.bool_)
-    for table in tables.values():
-        numbers = table["seq"]
-        present[numbers[(numbers >= 0) & (numbers < total)]] = True
-    return Events(dof, tables).until(seq=int(present.argmin()) - 1)
-
-
-def _table(kind: Kind, dof: int, batches: list[Any]) -> Table:
-    table = np.empty(sum(batch.num_rows for batch in batches), table_dtype(kind, dof))
-    end = 0
-    for batch in batches:
-        begin, end = end, end + batch.num_rows
-        part = table[begin:end]
-        for timeline, name in TIMELINES.items():
-            part[name] = batch.column(timeline).cast("int64").to_numpy()
-        for field in FIELDS[kind]:
-            column = batch.column(f"brrt.{kind.label}:{field.name}")
-            part[field.name] = from_arrow(field, column, dof)
-    if (np.diff(table["seq"]) <= 0).any():
-        table = table[np.argsort(table["seq"], kind="stable")]
-    return table
-
-
-def _batches(events: Events) -> Iterator[Events]:
-    for first in range(0, len(events), _BATCH):
-        tables = {}
-        for kind, table in events.tables.items():
-            begin, end = np.searchsorted(table["seq"], (first, first + _BATCH))
-            if begin < end:
-                tables[kind] = table[begin:end]
-        yield Events(events.dof, tables)
+    return f"{manifest.scenario.planner}-{manifest.digest()[:16]}"

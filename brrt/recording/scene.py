@@ -61,9 +61,22 @@ _BRIEFER = 5
 """Rewired edges stay for a part of that: there may be several in an iteration."""
 
 
+_TIMELINES = ("iteration", "event", "t")
+
+
 def is_flat(manifest: Manifest) -> bool:
     """Whether the picture is drawn in 2D."""
     return manifest.dim == 2
+
+
+def application(manifest: Manifest, world: World) -> str:
+    """Name what shares a layout with a run, and can: Rerun wants configurations to be alike."""
+    what = f"{manifest.dim}d"
+    if manifest.dof != manifest.dim:
+        what += f" {manifest.dof} dof"
+    if manifest.scenario.execute:
+        what += " driven"
+    return landscape.application(world, what)
 
 
 def tree_style(number: int) -> tuple[str, Colour]:
@@ -216,27 +229,28 @@ def world_view(world: World, *, below: str = "", name: str = "World") -> Any:
         below: The entity below which the run was drawn.
         name: The view's.
     """
-    past = [(name, rrb.TimeRangeBoundary.infinite()) for name in ("iteration", "event", "t")]
-    recent = [
-        ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS)),
-        ("event", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_EVENTS)),
-        ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS)),
-    ]
+    past = _ranges(*[(name, rrb.TimeRangeBoundary.infinite()) for name in _TIMELINES])
+    recent, just_now = _last(1), _last(_BRIEFER)
     shown = {f"/world/tree/{name}": past for name, _ in _TREES.values()}
-    just_now = [
-        ("iteration", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_ITERATIONS // _BRIEFER)),
-        ("event", rrb.TimeRangeBoundary.cursor_relative(seq=-FADING_EVENTS // _BRIEFER)),
-        ("t", rrb.TimeRangeBoundary.cursor_relative(seconds=-FADING_SECONDS / _BRIEFER)),
-    ]
     shown |= dict.fromkeys(_GROWING, past)
     shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
-    overrides = {f"{below}{entity}": [_ranges(starts)] for entity, starts in shown.items()}
+    overrides = {f"{below}{entity}": [ranges] for entity, ranges in shown.items()}
     return landscape.world_view(world, overrides, below=below, name=name)
 
 
-def _ranges(starts: list[tuple[str, Any]]) -> Any:
+def _last(part: int) -> Any:
+    """Show what came within a part of the fading times; making this takes a millisecond."""
+    begin = rrb.TimeRangeBoundary.cursor_relative
+    return _ranges(
+        ("iteration", begin(seq=-FADING_ITERATIONS // part)),
+        ("event", begin(seq=-FADING_EVENTS // part)),
+        ("t", begin(seconds=-FADING_SECONDS / part)),
+    )
+
+
+def _ranges(*starts: tuple[str, Any]) -> Any:
     now = rrb.TimeRangeBoundary.cursor_relative()
     return rrb.VisibleTimeRanges(
         [rrb.VisibleTimeRange(timeline, start=start, end=now) for timeline, start in starts]

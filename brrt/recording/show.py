@@ -34,7 +34,7 @@ def show_world(world: World, *, path: Path | None = None, view: bool = False) ->
             f"make the world smaller"
         )
     name = f"world-{hashlib.sha256(world.to_json().encode()).hexdigest()[:16]}"
-    rec = new_stream(name)
+    rec = new_stream(name, landscape.application(world, f"{world.dim}d world"))
     with filled(rec, _layout(world), path, view=view):
         landscape.log_world(rec, world)
         for mark, point, colour in (("start", world.start, START), ("goal", world.goal, GOAL)):

@@ -1,5 +1,7 @@
 """What a drawing knows of nodes or cells: where they are, and which of them are worth drawing."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,9 @@ from brrt.worlds.world import World
 DRAWN_IN_FULL = 50_000
 """Nodes up to which every edge is drawn."""
 
+IN_FULL, STRIDE = 10_000, 16
+"""Items of a kind that stay for a moment, as samples do: so many are all drawn, then one of 16."""
+
 _CELLS = 1 << 16
 """Cells of the grid over the world that thins out what comes after: a cell then takes one edge. So
 a million edges stay a picture that a viewer can turn, and yet every place that is reached shows."""
@@ -15,6 +20,13 @@ a million edges stay a picture that a viewer can turn, and yet every place that 
 _KEPT_NODES = 1 << 19
 """Nodes whose places are kept (16 bytes each in 3D); edges that leave from later ones are not
 drawn."""
+
+
+def thinned(first: int, count: int) -> NDArray[np.int64]:
+    """Return which of some items that stay for a moment are drawn, of which some came before."""
+    end, few = first + count, max(first, IN_FULL)
+    number = np.arange(first, min(end, IN_FULL)), np.arange(few + -few % STRIDE, end, STRIDE)
+    return np.concatenate(number) - first
 
 
 class Thinning:
@@ -30,21 +42,23 @@ class Thinning:
     def __init__(self, world: World) -> None:
         self.count = 0
         side = int(_CELLS ** (1 / world.dim))
-        self._lower, self._scale = world.lower, side / (world.upper - world.lower)
+        self._lower = world.lower.astype(np.float32)
+        self._scale = (side / (world.upper - world.lower)).astype(np.float32)
         self._grid = (side,) * world.dim
         self._taken = np.zeros(side**world.dim, np.bool_)
 
     def worth(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
-        wanted = np.ones(len(places), np.bool_)
-        steps = ((places - self._lower) * self._scale).astype(np.int64)
+        steps = ((places - self._lower) * self._scale).astype(np.intp)
         cells = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
-        if self.count + len(places) > DRAWN_IN_FULL:
-            number = np.arange(self.count, self.count + len(places))
-            first_in_cell = np.zeros(len(places), np.bool_)
-            first_in_cell[np.unique(cells, return_index=True)[1]] = True
-            wanted = (number < DRAWN_IN_FULL) | (first_in_cell & ~self._taken[cells])
-        self._taken[cells] = True
+        begin = min(max(DRAWN_IN_FULL - self.count, 0), len(places))
+        self._taken[cells[:begin]] = True
+        late = cells[begin:]
+        new = np.flatnonzero(~self._taken[late])
+        first_in_cell = new[np.unique(late[new], return_index=True)[1]]
+        wanted = np.arange(len(places)) < begin
+        wanted[begin + first_in_cell] = True
+        self._taken[late] = True
         self.count += len(places)
         return wanted
 
@@ -89,17 +103,18 @@ class Sketch:
         """
         which = np.flatnonzero(wanted & self.thinning.worth(places))
         self._make_room(nodes)
-        kept = (nodes >= 0) & (nodes < _KEPT_NODES)
-        self._places[nodes[kept]] = places[kept]
         slots = np.full(len(nodes), -1, np.int32)
         slots[which] = np.arange(self.drawn, self.drawn + len(which))
+        kept: Any = (nodes >= 0) & (nodes < _KEPT_NODES)
+        kept = slice(None) if kept.all() else kept  # which spares copies
+        self._places[nodes[kept]] = places[kept]
         self._slots[nodes[kept]] = slots[kept]
         self.drawn += len(which)
         return which
 
     def places(self, nodes: NDArray[np.int32]) -> NDArray[np.float32]:
         """Where nodes are, shape (n, dim); NaN, which no viewer draws, where that is not kept."""
-        found = self._places[np.clip(nodes, 0, len(self._places) - 1)]
+        found = self._places.take(nodes, axis=0, mode="clip")
         found[(nodes < 0) | (nodes >= len(self._places))] = np.nan
         return found
 
@@ -110,13 +125,14 @@ class Sketch:
 
     def slots(self, nodes: NDArray[np.int32]) -> NDArray[np.int32]:
         """Slots of nodes, shape (n,); -1 for those that are not drawn."""
-        found = self._slots[np.clip(nodes, 0, len(self._slots) - 1)]
+        found = self._slots.take(nodes, mode="clip")
         found[(nodes < 0) | (nodes >= len(self._slots))] = -1
         return found
 
     def _make_room(self, nodes: NDArray[np.int32]) -> None:
         need, have = min(int(nodes.max(initial=-1)) + 1, _KEPT_NODES), len(self._places)
         if need > have:
-            room = (0, min(max(need, 2 * have), _KEPT_NODES) - have)
-            self._places = np.pad(self._places, (room, (0, 0)), constant_values=np.nan)
-            self._slots = np.pad(self._slots, room, constant_values=-1)
+            room = min(max(need, 2 * have), _KEPT_NODES) - have
+            places = np.full((room, self._places.shape[1]), np.nan, np.float32)
+            self._places = np.concatenate([self._places, places])
+            self._slots = np.concatenate([self._slots, np.full(room, -1, np.int32)])

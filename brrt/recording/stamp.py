@@ -17,6 +17,10 @@ _BEGIN, _END = "!crc#", "#!"
 BLANK = f"{_BEGIN}QZ~jX^vK%wJ`yH&zP|uF*tB+{_END}"
 """Letters of which no four come together anywhere else, so that compression leaves them alone."""
 
+WRITTEN = f"QjZ~{BLANK}~Xw^"
+"""What is written. The letters on either side are for compression to take: what it finds anew near
+the text, such as zeros and a length, it extends into the text, by the first or the last letters."""
+
 _BLOCK = 1 << 20
 _TAIL = 1 << 22
 """The blank is written last but for the index of chunks, a few dozen bytes for each of them."""
@@ -56,6 +60,11 @@ def is_damaged(path: Path) -> bool:
         behind = at + len(BLANK)
         whole = _crc(file, behind, size, zlib.crc32(BLANK.encode(), before))
         return whole != int(found[2], 16)
+
+
+def blanked(data: bytes) -> bytes:
+    """Return a part of a file as it was before the stamp was filled in."""
+    return _STAMP.sub(BLANK.encode(), data)
 
 
 def _find(file: IO[bytes], text: str) -> tuple[int, int]:

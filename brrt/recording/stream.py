@@ -12,7 +12,7 @@ from brrt.recording import viewer
 from brrt.recording.drain import Drain
 
 
-def new_stream(name: str, application: str = viewer.APPLICATION) -> Any:
+def new_stream(name: str, application: str) -> Any:
     """Make a stream that goes nowhere yet.
 
     Args:
@@ -51,7 +51,7 @@ def filled(rec: Any, layout: rrb.Blueprint, path: Path | None, *, view: bool) ->
         RecordingError: The file cannot be written, or there is no viewer.
     """
     if view:
-        viewer.open_viewer(rec)
+        viewer.open_viewer()
     drain = None if path is None else Drain(path)
     try:
         connect(rec, layout, drain, view=view)

@@ -1,6 +1,5 @@
 """Trees as they grow, and as their edges change; the link where two of them meet."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,7 @@ from brrt.recording.canvas import Canvas, growing_rows, merged, moments
 from brrt.recording.fading import Fading
 from brrt.recording.pages import Pages
 from brrt.recording.paths import draw_bodies
-from brrt.recording.sketch import DRAWN_IN_FULL, Sketch
-
-_LINKS_IN_FULL, _LINK_STRIDE = 10_000, 16
-"""Links that are all drawn; then one of so many."""
+from brrt.recording.sketch import DRAWN_IN_FULL, Sketch, thinned
 
 
 class Trees:
@@ -36,7 +32,7 @@ class Trees:
     def write(self, events: Events) -> None:
         """Draw a batch."""
         edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
-        for number in np.unique(edges["tree"]).tolist():
+        for number in np.flatnonzero(np.bincount(edges["tree"])).tolist():
             if number not in self._trees:
                 self._sketches[number] = Sketch(self._canvas.world)
                 self._trees[number] = _Tree(self._canvas, number, self._sketches[number])
@@ -44,8 +40,7 @@ class Trees:
             mine = _of_tree(rewires, number)
             tree.draw(_of_tree(edges, number), mine)
             if len(mine):
-                lines = self._lines(mine["parent"], mine["node"], number, number)
-                self._fading.rewired(scene.tree_style(number)[0], mine, lines)
+                self._fading.rewired(number, mine)
         self._draw_links(events[Kind.CONNECT])
 
     def close(self) -> None:
@@ -56,21 +51,13 @@ class Trees:
     def _draw_links(self, table: Table) -> None:
         if not len(table) or not {0, 1} <= self._sketches.keys():
             return
-        number = np.arange(self._links, self._links + len(table))
+        rows = table[thinned(self._links, len(table))]
         self._links += len(table)
-        rows = table[(number < _LINKS_IN_FULL) | (number % _LINK_STRIDE == 0)]
         if len(rows):
-            lines = self._lines(rows["node"], rows["other"], 0, 1)
+            places = self._sketches[0].places(rows["node"]), self._sketches[1].places(rows["other"])
+            lines = np.stack(places, axis=1).reshape(-1, self._canvas.dim)
             ends = np.arange(1, len(rows) + 1)
             self._canvas.send(scene.LINK_ENTITY, rows, ends, self._canvas.strips(lines, 2))
-
-    def _lines(
-        self, froms: NDArray[np.int32], tos: NDArray[np.int32], tree: int, other: int
-    ) -> NDArray[np.float32]:
-        """Return both ends of lines between nodes, shape (2 n, dim)."""
-        sketches: Mapping[int, Sketch] = self._sketches
-        ends = sketches[tree].places(froms), sketches[other].places(tos)
-        return np.stack(ends, axis=1).reshape(-1, self._canvas.dim)
 
 
 class _Tree:
@@ -98,13 +85,15 @@ class _Tree:
             slots = self._sketch.slots(changes["node"])
             drawn = slots >= 0
             if drawn.any():
-                rows = changes[drawn]
-                self._pages.change(rows, slots[drawn], self._lines(rows))
+                which = np.flatnonzero(slots >= 0)
+                lines = self._lines(changes, which)
+                self._pages.change(changes.take(which), slots[which], lines)
         elif len(which):
-            rows = edges[which]
-            lines = self._lines(rows)
-            ends = growing_rows(self._sketch.drawn - len(rows), len(rows))
-            self._canvas.send(self._entity, rows, ends, self._strips(lines))
+            lines = self._lines(edges, which)
+            ends = growing_rows(self._sketch.drawn - len(which), len(which))
+            counts = np.diff(ends, prepend=0)
+            rows = edges[which[ends - 1]]
+            self._canvas.send_rows(self._entity, rows, counts, self._strips(lines))
             self._drawn.append(lines)
 
     def close(self) -> None:
@@ -150,10 +139,11 @@ class _Tree:
             self._canvas.put_away(self._entity, first[0], self._root)
             self._drawn.clear()
 
-    def _lines(self, rows: Table) -> NDArray[np.void]:
-        lines = np.empty(len(rows), self._line)
-        lines["ends"][:, 0] = self._sketch.places(rows["parent"])
-        lines["ends"][:, 1] = self._sketch.places(rows["node"])
+    def _lines(self, rows: Table, which: NDArray[np.int64]) -> NDArray[np.void]:
+        """Return the edges that some rows tell of."""
+        lines = np.empty(len(which), self._line)
+        lines["ends"][:, 0] = self._sketch.places(rows["parent"][which])
+        lines["ends"][:, 1] = self._sketch.places(rows["node"][which])
         return lines
 
     def _strips(self, lines: NDArray[np.void]) -> Any:
@@ -162,4 +152,4 @@ class _Tree:
 
 def _of_tree(table: Table, number: int) -> Table:
     mine = table["tree"] == number
-    return table if mine.all() else table[mine]
+    return table if mine.all() else table.take(np.flatnonzero(mine))  # a mask takes longer

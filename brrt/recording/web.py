@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.recording import viewer
-from brrt.recording.drive import HERE, START_S, Program, free_port, is_taken
+from brrt.recording.viewer import HERE, START_S, Program, free_port, is_taken
 
 PORT = 9090
 """Where the page is, if nothing else is there."""

@@ -91,6 +91,10 @@ class Account:
             yield "with " + ", ".join(f"{name} {_text(value)}" for name, value in settings.items())
         ends = (self._manifest.start, self._manifest.goal)
         yield "from {} to {}".format(*(", ".join(map(_text, q)) for q in ends))
+        for branch, (_, after) in zip(
+            self._manifest.branches, self._manifest.stretches[1:], strict=True
+        ):
+            yield f"at iteration {branch.iteration:,} of {branch.file}: " + branch.told(after)
 
     def _count(self, events: Events, first: int, end: int) -> None:
         """Count the events whose numbers lie in a range."""
@@ -180,10 +184,11 @@ def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
     if choice == "tree":
         return ", ".join(f"{n:,} in tree {tree}" for tree, n in found.items())
     choices = next(field.choices for field in FIELDS[kind] if field.name == choice)
-    return ", ".join(f"{n:,} {_lower(choices, value)}" for value, n in found.items())
+    return ", ".join(f"{n:,} {choice_name(choices, value)}" for value, n in found.items())
 
 
-def _lower(choices: type[IntEnum] | None, value: int) -> str:
+def choice_name(choices: type[IntEnum] | None, value: int) -> str:
+    """Name a choice in words; a number that is none of the choices stays what it is."""
     known = choices is not None and value in set(choices)
     return choices(value).name.lower().replace("_", " ") if known and choices else str(value)
 

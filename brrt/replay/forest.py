@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import RecordingError
-from brrt.events import Events, Kind
+from brrt.events import Events, Kind, Table
 from brrt.replay.ledger import (
     CIRCLE,
     NO_NODE,
@@ -43,22 +44,12 @@ class Tree:
     @property
     def leaves(self) -> int:
         """Nodes that are nobody's parent."""
-        return len(self) - len(np.unique(self.parent[self.parent >= 0]))
+        return leaves_of(self.parent)
 
     @property
     def depth(self) -> int:
         """Edges from the root to the deepest node."""
-        up = self.parent.copy()
-        # Each round halves what is left of every way up: log2(depth) rounds.
-        steps = (up >= 0).astype(np.int64)
-        while (up >= 0).any():
-            on_way = np.flatnonzero(up >= 0)
-            above = up[on_way]
-            steps[on_way] += steps[above]
-            up[on_way] = up[above]
-            if steps.max() > len(self):
-                raise RecordingError("a node is its own ancestor")
-        return int(steps.max(initial=0))
+        return depth_of(self.parent)
 
     def path_to(self, node: int) -> NDArray[np.float64]:
         """Configurations from the root to a node, shape (m, dof).
@@ -66,12 +57,71 @@ class Tree:
         Raises:
             RecordingError: The parents do not lead to a root.
         """
+        return self.q[self.lineage(node)]
+
+    def lineage(self, node: int) -> list[int]:
+        """Nodes from the root to a node.
+
+        Raises:
+            RecordingError: The parents do not lead to a root.
+        """
         lineage = [node]
         while self.parent[lineage[-1]] >= 0:
-            lineage.append(int(self.parent[lineage[-1]]))
+            above = int(self.parent[lineage[-1]])
+            if above >= len(self):
+                raise RecordingError(
+                    f"node {lineage[-1]} has the parent {above}, which is not there"
+                )
+            lineage.append(above)
             if len(lineage) > len(self):
                 raise RecordingError(f"node {node} is its own ancestor")
-        return self.q[lineage[::-1]]
+        return lineage[::-1]
+
+    def below(self, node: int) -> NDArray[np.int64]:
+        """Nodes that a node is an ancestor of, level by level, shape (m,).
+
+        Raises:
+            RecordingError: The node is its own ancestor.
+        """
+        children = np.argsort(self.parent, kind="stable")
+        parents = self.parent[children]
+        found, level, total = [np.empty(0, np.int64)], np.array([node]), 0
+        while total <= len(self):
+            first = np.searchsorted(parents, level, side="left")
+            count = np.searchsorted(parents, level, side="right") - first
+            before = np.cumsum(count) - count
+            level = children[np.repeat(first - before, count) + np.arange(count.sum())]
+            if not len(level):
+                return np.concatenate(found)
+            found.append(level)
+            total += len(level)
+        raise RecordingError(f"node {node} is its own ancestor")
+
+
+def leaves_of(parent: NDArray[np.signedinteger[Any]]) -> int:
+    """Count the nodes that are nobody's parent, shape (n,)."""
+    has_child = np.zeros(len(parent), np.bool_)
+    has_child[parent[parent >= 0]] = True
+    return len(parent) - int(has_child.sum())
+
+
+def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
+    """Count the edges from the root to the deepest node, shape (n,).
+
+    Raises:
+        RecordingError: A node is its own ancestor.
+    """
+    up = parent.copy()
+    # Each round halves what is left of every way up: log2(depth) rounds.
+    steps = (up >= 0).astype(np.int64)
+    while (up >= 0).any():
+        on_way = np.flatnonzero(up >= 0)
+        above = up[on_way]
+        steps[on_way] += steps[above]
+        up[on_way] = up[above]
+        if steps.max() > len(parent):
+            raise RecordingError("a node is its own ancestor")
+    return int(steps.max(initial=0))
 
 
 def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tree]:
@@ -95,12 +145,7 @@ def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tre
     trees = {}
     for number in sorted(set(np.unique(edges["tree"]).tolist()) | rewired):
         rows = edges[edges["tree"] == number]
-        wrong = np.flatnonzero(rows["node"] != np.arange(len(rows)))
-        if len(wrong):
-            row = rows[wrong[0]]
-            raise RecordingError(
-                f"event {row['seq']}: node {row['node']} joins tree {number} as its node {wrong[0]}"
-            )
+        check_numbers(rows, number, 0)
         tree = Tree(rows["q"], rows["parent"], rows["cost"], rows["seq"])
         trees[number] = (
             _rewired(tree, changes(events, number), distance) if (number in rewired) else tree
@@ -114,7 +159,32 @@ def _rewired(tree: Tree, made: Changes, distance: Distance | None) -> Tree:
     if distance is not None:
         length = edge_lengths(tree.q, made, distance)
     ledger = fold(made, length)
-    wrong = np.flatnonzero(ledger.verdict != SOUND)
+    check_made(made, ledger.verdict)
+    return Tree(tree.q, ledger.parent.astype(np.int32), ledger.cost, tree.born)
+
+
+def check_numbers(rows: Table, tree: int, first: int) -> None:
+    """See that the edges of a tree number its nodes on from `first`.
+
+    Raises:
+        RecordingError: They do not.
+    """
+    wrong = np.flatnonzero(rows["node"] != np.arange(first, first + len(rows)))
+    if len(wrong):
+        at = int(wrong[0])
+        row = rows[at]
+        raise RecordingError(
+            f"event {row['seq']}: node {row['node']} joins tree {tree} as its node {first + at}"
+        )
+
+
+def check_made(made: Changes, verdict: NDArray[np.uint8]) -> None:
+    """See that all changes of a tree could be made.
+
+    Raises:
+        RecordingError: One could not.
+    """
+    wrong = np.flatnonzero(verdict != SOUND)
     if len(wrong):
         i = int(wrong[0])
         node, parent = int(made.node[i]), int(made.parent[i])
@@ -122,6 +192,5 @@ def _rewired(tree: Tree, made: Changes, distance: Distance | None) -> Tree:
             NO_PARENT: f"node {node} gets parent {parent}, which is not there",
             NO_NODE: f"node {node} is rewired before it is there",
             CIRCLE: f"with parent {parent}, node {node} is its own ancestor",
-        }[int(ledger.verdict[i])]
+        }[int(verdict[i])]
         raise RecordingError(f"event {made.seq[i]}: {why}")
-    return Tree(tree.q, ledger.parent.astype(np.int32), ledger.cost, tree.born)

@@ -63,23 +63,27 @@ class Ledger(NamedTuple):
 
 def changes(events: Events, tree: int) -> Changes:
     """Merge the edges and rewires of a tree in the order of the log."""
-    edges, rewires = (of_tree(events[kind], tree) for kind in (Kind.EDGE, Kind.REWIRE))
-    if not len(rewires):
-        node, joins = np.arange(len(edges)), np.ones(len(edges), bool)
-        return Changes(edges["seq"], node, edges["parent"], edges["cost"], joins)
+    edges, rewires = (
+        table[table["tree"] == tree] for table in (events[Kind.EDGE], events[Kind.REWIRE])
+    )
+    return merged(edges, rewires, 0)
+
+
+def joined(edges: Table) -> Changes:
+    """List what happens to a tree that only grows: its edges, and no copies of them."""
+    nodes = np.arange(len(edges))
+    return Changes(edges["seq"], nodes, edges["parent"], edges["cost"], np.ones(len(nodes), bool))
+
+
+def merged(edges: Table, rewires: Table, first: int) -> Changes:
+    """Merge edges and rewires of one tree; its nodes are numbered on from `first`."""
     seq = np.concatenate([edges["seq"], rewires["seq"]])
     order = np.argsort(seq, kind="stable")
     joins = order < len(edges)
-    node = np.concatenate([np.arange(len(edges)), rewires["node"]])
+    node = np.concatenate([np.arange(first, first + len(edges)), rewires["node"]])
     parent = np.concatenate([edges["parent"], rewires["parent"]]).astype(np.int64)
     stated = np.concatenate([edges["cost"], rewires["cost"]])
     return Changes(seq[order], node[order].astype(np.int64), parent[order], stated[order], joins)
-
-
-def of_tree(table: Table, tree: int) -> Table:
-    """Return the rows of one tree; where they are all, the table itself and no copy."""
-    mine = table["tree"] == tree
-    return table if mine.all() else table[mine]
 
 
 def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
@@ -125,8 +129,6 @@ def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -
         asked: Questions.
     """
     nodes = int(made.joins.sum())
-    if nodes == len(made.seq) and length is not None:
-        return _grown(made, length, asked)
     if length is None:
         length = np.full(len(made.seq), np.nan)
     parent, links = np.full(nodes, -1, np.int64), np.full((nodes, 3), -1, np.int64)
@@ -138,13 +140,18 @@ def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -
     _fold(
         moments, np.asarray(asked.node, np.int64), answers,
         made.node, made.parent, made.stated, made.joins, np.ascontiguousarray(length, np.float64),
-        parent, links, cost, lengths, parent_cost, before, verdict,
+        parent, links, cost, lengths, parent_cost, before, verdict, _nothing_yet(),
     )  # fmt: skip
     return Ledger(parent, cost, parent_cost, before, verdict, answers)
 
 
-def _grown(made: Changes, length: Floats, asked: Questions) -> Ledger:
-    """Fold a tree that only grows: no cost changes, so there is less to keep."""
+def _nothing_yet() -> Ints:
+    """Return the place of a fold that has not begun."""
+    return np.array([0, 1])
+
+
+def sum_up(made: Changes, length: Floats, asked: Questions = NONE) -> Ledger:
+    """Fold a tree that only grows, see `fold`: no cost changes, so there is less to keep."""
     nodes = np.arange(len(made.seq))
     there = (made.parent >= 0) & (made.parent < nodes)
     parent = np.where(there, made.parent, -1).astype(np.int64)
@@ -165,6 +172,59 @@ def _sum_up(parent: Ints, length: Floats, cost: Floats) -> None:
     for i in range(len(parent)):
         if parent[i] >= 0:
             cost[i] = cost[parent[i]] + length[i]
+
+
+class Standing:
+    """A tree that rewires as it stands, brought forward batch by batch, at 48 bytes a node.
+
+    Attributes:
+        nodes: Nodes so far.
+    """
+
+    def __init__(self) -> None:
+        self.nodes = 0
+        self._place = _nothing_yet()
+        self._parent, self._links = np.empty(0, np.int64), np.empty((0, 3), np.int64)
+        self._cost, self._lengths = np.empty(0), np.empty(0)
+
+    @property
+    def parent(self) -> Ints:
+        """Parents, shape (n,)."""
+        return self._parent[: self.nodes]
+
+    @property
+    def cost(self) -> Floats:
+        """Costs-to-come, shape (n,)."""
+        return self._cost[: self.nodes]
+
+    def change(self, made: Changes) -> NDArray[np.uint8]:
+        """Make changes, those that follow the ones so far; return whether each could be made.
+
+        Args:
+            made: The changes; nodes are numbered through.
+        """
+        self._make_room(int(made.joins.sum()))
+        m = len(made.seq)
+        verdict, nothing = np.zeros(m, np.uint8), np.empty(0)
+        _fold(
+            NONE.seq, NONE.node, nothing,
+            made.node, made.parent, made.stated, made.joins, np.full(m, np.nan),
+            self._parent, self._links, self._cost, self._lengths, np.empty(m), np.empty(m),
+            verdict, self._place,
+        )  # fmt: skip
+        return verdict
+
+    def _make_room(self, more: int) -> None:
+        self.nodes += more
+        room = len(self._parent)
+        if self.nodes <= room:
+            return
+        room = max(self.nodes, room + room // 2)
+        for name, blank in (("_parent", -1), ("_links", -1), ("_cost", 0), ("_lengths", 0)):
+            old = getattr(self, name)
+            new = np.full((room, *old.shape[1:]), blank, old.dtype)
+            new[: len(old)] = old
+            setattr(self, name, new)
 
 
 _CHILD, _NEXT, _LAST = range(3)
@@ -240,9 +300,13 @@ def _fold(
     parent_cost: Floats,
     before: Floats,
     verdict: NDArray[np.uint8],
+    place: Ints,
 ) -> None:
-    """See `fold`; a question waits for its number of changes; from `parent` on it writes."""
-    born, question, rising = 0, 0, True
+    """See `fold`; a question waits for its number of changes; from `parent` on it writes.
+
+    The place, where to go on, is how many nodes there are, and whether no edge is below 0.
+    """
+    born, question, rising = place[0], 0, place[1] == 1
     for i in range(len(node)):
         question = _answer(question, i, moments, asked, answers, cost, born)
         v, p = node[i], new_parent[i]
@@ -273,4 +337,5 @@ def _fold(
         while at >= 0:
             cost[at] = cost[parent[at]] + lengths[at]
             at = _below(v, at, parent, links)
+    place[0], place[1] = born, rising
     _answer(question, len(node), moments, asked, answers, cost, born)

@@ -70,6 +70,11 @@ class Metrics:
         return self._raw is not None
 
     @property
+    def best_path(self) -> Path | None:
+        """The path that stands: the smoothed one, or else the last that the planner found."""
+        return self._smoothed or self._raw
+
+    @property
     def iterations(self) -> int:
         """The planner's count at the last event."""
         return self._iterations
@@ -96,7 +101,7 @@ class Metrics:
         """
         scenario = self._manifest.scenario
         raw, smoothed = self._raw, self._smoothed
-        final = smoothed or raw
+        final = self.best_path
         return {
             "planner": scenario.planner,
             "world": scenario.world,

@@ -98,7 +98,7 @@ def free_fraction(world: World, seed: int = 0) -> tuple[float, float]:
         counted. Where no cell's two points differ it is taken to be that of one such cell:
         something may have been missed.
     """
-    grid = _map_alone(world)
+    grid = map_alone(world)
     if grid is not None:
         area = grid.resolution**2 * float((~grid.cells).sum())
         return min(area / float((world.upper - world.lower).prod()), 1.0), 0.0
@@ -128,7 +128,7 @@ def connected(world: World, start: Floats, goal: Floats, cells: int = CELLS) -> 
         goal: Where it should end, shape (d,).
         cells: Cells of the finest lattice.
     """
-    ends, grid = np.array([start, goal], np.float64), _map_alone(world)
+    ends, grid = np.array([start, goal], np.float64), map_alone(world)
     for name, point, hit in zip(("start", "goal"), ends, covered(world, ends), strict=True):
         if not world.inside(point):
             return Connection(False, 0.0, f"the {name} lies outside the bounds")
@@ -138,7 +138,7 @@ def connected(world: World, start: Floats, goal: Floats, cells: int = CELLS) -> 
     return _search(world, ends, cells) if grid is None else _search_map(grid, ends)
 
 
-def _map_alone(world: World) -> Grid | None:
+def map_alone(world: World) -> Grid | None:
     """Return the grid of a world that is nothing but a grid, as far as the bounds reach."""
     if world.grid is None or shapes_of(world):
         return None
@@ -164,7 +164,7 @@ def _search(world: World, ends: Floats, most: int) -> Connection:
         lattice = Lattice.over(world.lower, world.upper, cells)
         free = ~lattice.blocked(obstacles)
         size = float(lattice.cell.max())
-        nearest = [_settled(lattice, free, obstacles, end) for end in ends]
+        nearest = [settled(lattice, free, obstacles, end) for end in ends]
         if nearest[0] is not None and nearest[1] is not None:
             label = components(free)
             if label[nearest[0]] == label[nearest[1]]:
@@ -174,7 +174,7 @@ def _search(world: World, ends: Floats, most: int) -> Connection:
         cells = min(_FINER * cells, most)
 
 
-def _settled(
+def settled(
     lattice: Lattice, free: Bools, obstacles: list[Shapes], point: Floats
 ) -> tuple[int, ...] | None:
     """Return a free cell that a straight motion from a point leads to, or None."""
@@ -205,4 +205,12 @@ def _free_motion(obstacles: list[Shapes], a: Floats, b: Floats) -> bool:
     return False
 
 
-__all__ = ["CELLS", "Connection", "connected", "covered", "free_fraction"]
+__all__ = [
+    "CELLS",
+    "Connection",
+    "connected",
+    "covered",
+    "free_fraction",
+    "map_alone",
+    "settled",
+]

@@ -8,7 +8,7 @@ one, write it and put it into `RULES` at the end of its file.
 
 from collections.abc import Callable, Iterable, Iterator
 from inspect import isgeneratorfunction
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -57,6 +57,7 @@ def examine(
         BrrtError: The manifest's query is of no use in its world.
     """
     case = Case.of(manifest, world, contract, cut if callable(cut) else lambda: bool(cut))
+    firsts = [first for first, _ in case.stretches[1:]]
     tallies, looking = [], []
     # A doctored log may hold anything, so arithmetic on it may overflow; that is no news.
     with np.errstate(all="ignore"):
@@ -64,7 +65,7 @@ def examine(
             promise = (rule.__doc__ or "").partition("\n")[0]
             tallies.append(Tally(rule.__name__.replace("_", " "), promise))
             looking.append(rule(case, tallies[-1]) if isgeneratorfunction(rule) else None)
-        for window in chain([None], _windows(events)):
+        for window in chain([None], _windows(events, firsts)):
             if window is not None:
                 case.kept.take(window)
             for look in looking:
@@ -78,19 +79,33 @@ def examine(
     return tallies
 
 
-def _windows(events: Events | Iterable[Events]) -> Iterator[Events]:
-    """Yield batches that are large enough to be worth the while, and none without an event."""
-    if isinstance(events, Events):
-        yield from [events] if len(events) else []
-        return
+def _windows(events: Events | Iterable[Events], firsts: list[int]) -> Iterator[Events]:
+    """Yield batches that are large enough to be worth the while, and none without an event.
+
+    Args:
+        events: The log.
+        firsts: Events that begin a window in any case, in order.
+    """
     some: list[Events] = []
-    for batch in events:
+    for batch in [events] if isinstance(events, Events) else events:
         some.append(batch)
         if sum(map(len, some)) >= _WINDOW:
-            yield Events.concat(batch.dof, some)
+            yield from _parts(Events.concat(batch.dof, some), firsts)
             some = []
     if sum(map(len, some)):
-        yield Events.concat(some[0].dof, some)
+        yield from _parts(Events.concat(some[0].dof, some) if len(some) > 1 else some[0], firsts)
+
+
+def _parts(window: Events, firsts: list[int]) -> Iterator[Events]:
+    """Part a window ahead of events of these numbers."""
+    for low, high in pairwise([-np.inf, *firsts, np.inf]) if firsts else [(-np.inf, np.inf)]:
+        tables = {
+            kind: table if not firsts else table[(low <= table["seq"]) & (table["seq"] < high)]
+            for kind, table in window.tables.items()
+        }
+        part = Events(window.dof, {kind: table for kind, table in tables.items() if len(table)})
+        if len(part):
+            yield part
 
 
 def check(

@@ -15,7 +15,17 @@ from brrt.replay.checks.keeping import Kept
 from brrt.replay.checks.motions import Obstacles, first_hits
 from brrt.replay.checks.script import Scripts
 from brrt.replay.checks.tally import Tally
-from brrt.replay.ledger import Changes, Ledger, changes, edge_lengths, fold, of_tree
+from brrt.replay.ledger import (
+    NONE,
+    Changes,
+    Ledger,
+    Questions,
+    edge_lengths,
+    fold,
+    joined,
+    merged,
+    sum_up,
+)
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
@@ -36,6 +46,17 @@ Windows = Generator[None, Events | None]
 def waypoints(event: Any, dof: int) -> Floats:
     """A path's configurations, shape (n, dof)."""
     return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
+
+
+def _of_tree(table: Table, tree: int) -> Table:
+    """Return the rows of one tree; where they are all, the table itself and no copy."""
+    mine = table["tree"] == tree
+    return table if mine.all() else table[mine]
+
+
+def folded(made: Changes, length: Floats, asked: Questions = NONE) -> Ledger:
+    """Fold a tree, as `fold` does, with less to keep where nothing is rewired."""
+    return sum_up(made, length, asked) if made.joins.all() else fold(made, length, asked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +106,9 @@ class Case:
         goal: Last configuration, shape (dof,).
         lower: Least configuration, shape (dof,).
         upper: Greatest configuration, shape (dof,).
-        contract: What the planner promises.
+        contract: What the planner promises, by the settings that it ended with.
+        stretches: The number of the event that each contract rules from, and the contract: more
+            than one where a run went on from a recorded one with other settings.
         known: Whether the planner is known here, so that there is a contract.
         breaks_off: Says, once the log was read, whether it breaks off.
     """
@@ -99,6 +122,7 @@ class Case:
     lower: Floats
     upper: Floats
     contract: Contract
+    stretches: tuple[tuple[int, Contract], ...]
     known: bool
     breaks_off: Callable[[], bool]
 
@@ -123,19 +147,23 @@ class Case:
         """
         scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
         problem = scenario.make_problem(world)
-        if contract is None and scenario.planner in PLANNERS:
-            contract = scenario.make_planner().contract(problem)
+        known = contract is not None or scenario.planner in PLANNERS
+        stretches: tuple[tuple[int, Contract], ...] = ((0, contract or Contract()),)
+        if contract is None and known:
+            stretches = tuple(
+                (first, ruling.make_planner().contract(problem))
+                for first, ruling in manifest.stretches
+            )
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
-        known, contract = contract is not None, contract or Contract()
         return cls(
-            manifest, world, Kept(manifest.dof, contract), problem.robot, problem.start,
-            problem.goal, *bounds, contract, known, breaks_off,
+            manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
+            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off,
         )  # fmt: skip
 
     @cached_property
     def scripts(self) -> Scripts:
         """The log's events in one table, iteration by iteration, for rules that read it so."""
-        return Scripts(self.dof)
+        return Scripts(self.dof, {first for first, _ in self.stretches})
 
     @cached_property
     def events(self) -> Events:
@@ -151,6 +179,24 @@ class Case:
     def dof(self) -> int:
         """Numbers in a configuration."""
         return self.manifest.dof
+
+    def stretch(self, table: Table) -> NDArray[np.int64]:
+        """Return which of the `stretches` each event belongs to, shape (n,)."""
+        firsts = [first for first, _ in self.stretches]
+        return np.maximum(np.searchsorted(firsts, table["seq"], side="right") - 1, 0)
+
+    def ruling(self, window: Events | None) -> Contract:
+        """Return the contract that rules a window, which ends where another one begins to rule."""
+        heads = [table[:1] for table in window.tables.values()] if window is not None else []
+        if not heads:
+            return self.contract
+        return self.stretches[min(int(self.stretch(head)[0]) for head in heads if len(head))][1]
+
+    def limits(self, table: Table, figure: Callable[[Contract], float | None]) -> Floats:
+        """Return a limit that each event is held to, infinite where there is none, shape (n,)."""
+        found = [figure(contract) for _, contract in self.stretches]
+        each = np.array([np.inf if limit is None else limit for limit in found])
+        return np.asarray(each[self.stretch(table)])
 
     def distance(self, a: Floats, b: Floats) -> Floats:
         """Distances in the robot's metric between rows of configurations."""
@@ -195,10 +241,11 @@ class Case:
         return [self._grown(number) for number in sorted(numbers)]
 
     def _grown(self, number: int) -> Grown:
-        edges, rewires = (of_tree(self.events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
-        made = changes(self.events, number)
+        edges, rewires = (_of_tree(self.events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
+        made = merged(edges, rewires, 0) if len(rewires) else joined(edges)
         length = edge_lengths(np.asarray(edges["q"]), made, self.distance)
-        return Grown(number, edges, rewires, made, length, fold(made, length))
+        ledger = folded(made, length)
+        return Grown(number, edges, rewires, made, length, ledger)
 
     @cached_property
     def paths(self) -> list[tuple[Any, Floats]]:

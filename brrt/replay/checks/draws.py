@@ -7,8 +7,8 @@ draws after all it has drawn before is even whatever came of that; so it is no m
 ended, nor that draws which failed are drawn again.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +54,8 @@ class _Past:
 
     best: float = np.inf
     sample: int = -1
-    edge: tuple[int, float] = field(default=(-1, np.inf))
+    edge: int = -1
+    near: tuple[bool, bool] = (False, False)
 
     def drawn(self, case: Case, window: Events) -> Drawn:
         """Put the window's samples into the light of what was known."""
@@ -62,25 +63,18 @@ class _Past:
         paths = paths[paths["stage"] != Stage.SMOOTHED]
         costs = np.append(self.best, paths["cost"])
         best = costs[np.searchsorted(paths["seq"], table["seq"])]
-        far = np.append(self.edge[1], case.distance(np.asarray(edges["q"]), case.goal[None]))
-        seqs = np.append(self.edge[0], edges["seq"])
-        newest = np.searchsorted(seqs, table["seq"]) - 1
-        before = np.append(self.sample, table["seq"])[:-1]
-        # In a doctored log the first event of a window may be anything.
-        fresh = (seqs[newest] > before) & (newest >= 0)
-        step = case.contract.step or 0.0
-        near, slack = far[newest], CLOSE * step + case.blur
-        self.best, self.edge = float(costs[-1]), (int(seqs[-1]), float(far[-1]))
+        # Where settings change, a node was told to be near by those that it was added under.
+        step = case.ruling(window).step or 0.0
+        far = case.distance(np.asarray(edges["q"]), case.goal[None])
+        forced = np.append(self.near[0], (far > 0) & (far <= step))
+        unsure = np.append(self.near[1], np.abs(far - step) <= CLOSE * step + case.blur)
+        seqs = np.append(self.edge, edges["seq"])
+        newest = np.maximum(np.searchsorted(seqs, table["seq"]) - 1, 0)
+        fresh = seqs[newest] > np.append(self.sample, table["seq"])[:-1]
+        self.best, self.edge = float(costs[-1]), int(seqs[-1])
+        self.near = bool(forced[-1]), bool(unsure[-1])
         self.sample = int(table["seq"][-1]) if len(table) else self.sample
-        return Drawn(
-            table, best,
-            forced=np.asarray(fresh & (near > 0) & (near <= step)),
-            unsure=np.asarray(fresh & (np.abs(near - step) <= slack)),
-        )  # fmt: skip
-
-
-def _draws(case: Case) -> Draws | None:
-    return case.contract.draws
+        return Drawn(table, best, fresh & forced[newest], fresh & unsure[newest])
 
 
 def samples(case: Case, tally: Tally) -> Windows:
@@ -96,11 +90,11 @@ def samples(case: Case, tally: Tally) -> Windows:
 
 def sources(case: Case, tally: Tally) -> Windows:
     """Each sample is from a source that the planner may draw from then."""
-    draws, past = _draws(case), _Past()
+    past = _Past()
     while (window := (yield)) is not None:
+        drawn, draws = past.drawn(case, window), case.ruling(window).draws
         if draws is None:
             continue
-        drawn = past.drawn(case, window)
         source = drawn.table["source"]
         may = _allowed(draws, drawn)
         wrong = ~np.select([source == s for s in Source], [may[s] for s in Source], default=True)
@@ -134,9 +128,9 @@ def informed_samples(case: Case, tally: Tally) -> Windows:
     """
     past = _Past()
     while (window := (yield)) is not None:
+        drawn = past.drawn(case, window)
         if not isinstance(case.robot, Point):
             continue
-        drawn = past.drawn(case, window)
         chosen = (drawn.table["source"] == Source.INFORMED) & np.isfinite(drawn.best)
         some, best = drawn.table[chosen], drawn.best[chosen]
         q = np.asarray(some["q"])
@@ -148,8 +142,8 @@ def informed_samples(case: Case, tally: Tally) -> Windows:
 
 
 def _tests(case: Case) -> int:
-    """Bets on a recording: on two coins, each axis twice, all axes, and pairs to shortcut."""
-    return 4 + 2 * case.dof
+    """Bets on a recording: on two coins a stretch, each axis twice, all axes, and on pairs."""
+    return 2 * len(case.stretches) + 2 + 2 * case.dof
 
 
 def _follow(tally: Tally, watch: Watch, table: Table, draws: Floats) -> None:
@@ -159,43 +153,49 @@ def _follow(tally: Tally, watch: Watch, table: Table, draws: Floats) -> None:
         tally.fault(table[row], words)
 
 
-def _close(tally: Tally, *watches: Watch) -> None:
+def _close(tally: Tally, *watches: Watch | None) -> None:
     for watch in watches:
-        for _, words in watch.close():
+        for _, words in () if watch is None else watch.close():
             tally.fault(None, words)
+
+
+def _tosses(case: Case, what: str, chance: Callable[[Draws], float]) -> list[Watch | None]:
+    """Make a bet for each stretch in which a coin is tossed."""
+    chances = [0.0 if c.draws is None else chance(c.draws) for _, c in case.stretches]
+    return [Watch(Tosses(p, what), _tests(case)) if 0 < p < 1 else None for p in chances]
+
+
+def _watch(case: Case, watches: list[Watch | None], table: Table) -> Watch | None:
+    """Choose the bet on the stretch that the rows of a window belong to."""
+    return watches[int(case.stretch(table[:1])[0])] if len(table) else None
 
 
 def goal_draws(case: Case, tally: Tally) -> Windows:
     """The goal is drawn as often as stated (one false alarm in a million recordings)."""
-    draws, past = _draws(case), _Past()
-    tossed = draws is not None and 0 < draws.goal_bias < 1
-    watch = Watch(Tosses(draws.goal_bias, "the goal"), _tests(case)) if draws and tossed else None
+    watches, past = _tosses(case, "the goal", lambda draws: draws.goal_bias), _Past()
     while (window := (yield)) is not None:
+        drawn, draws = past.drawn(case, window), case.ruling(window).draws
+        watch = _watch(case, watches, drawn.table)
         if draws is None or watch is None:
             continue
-        drawn = past.drawn(case, window)
         chosen = np.isinf(drawn.best)
         if draws.goal_in_reach:
             chosen &= ~(drawn.forced | drawn.unsure)
         some = drawn.table[chosen]
         _follow(tally, watch, some, np.asarray(some["source"] == Source.GOAL, np.float64))
-    if watch is not None:
-        _close(tally, watch)
+    _close(tally, *watches)
 
 
 def coin_tosses(case: Case, tally: Tally) -> Windows:
     """A tree heads for the other as often as stated (one false alarm in a million recordings)."""
-    draws = _draws(case)
-    watch = None
-    if draws is not None and 0 < draws.coin < 1:
-        watch = Watch(Tosses(draws.coin, "the other tree's newest node"), _tests(case))
+    watches = _tosses(case, "the other tree's newest node", lambda draws: draws.coin)
     while (window := (yield)) is not None:
+        table = window[Kind.SAMPLE]
+        watch = _watch(case, watches, table)
         if watch is not None:
-            table = window[Kind.SAMPLE]
             fell = np.asarray(table["source"] == Source.OTHER_TREE, np.float64)
             _follow(tally, watch, table, fell)
-    if watch is not None:
-        _close(tally, watch)
+    _close(tally, *watches)
 
 
 def even_draws(case: Case, tally: Tally) -> Windows:
@@ -210,7 +210,7 @@ def even_draws(case: Case, tally: Tally) -> Windows:
         bets.append((fine, Together(len(fine))))
     watches = [(axes, Watch(bet, _tests(case))) for axes, bet in bets]
     while (window := (yield)) is not None:
-        if _draws(case) is None:
+        if case.ruling(window).draws is None:
             continue
         table = window[Kind.SAMPLE]
         some = table[table["source"] == Source.UNIFORM]
@@ -230,9 +230,9 @@ def even_informed_draws(case: Case, tally: Tally) -> Windows:
     names = case.robot.coordinates(case.world)
     watches = [Watch(Evenness(f"{name} along its chord"), _tests(case)) for name in names]
     while (window := (yield)) is not None:
-        if _draws(case) is None or not isinstance(case.robot, Point):
-            continue
         drawn = past.drawn(case, window)
+        if case.ruling(window).draws is None or not isinstance(case.robot, Point):
+            continue
         chosen = (drawn.table["source"] == Source.INFORMED) & np.isfinite(drawn.best)
         some, best = drawn.table[chosen], drawn.best[chosen]
         for k, watch in enumerate(watches):

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Reason, Source, Table
-from brrt.planners.contract import Growth
+from brrt.planners.contract import Contract, Growth
 from brrt.replay.checks.case import CLOSE, Case, Grown, Windows
 from brrt.replay.checks.keeping import Thinned
 from brrt.replay.checks.log import text
@@ -26,10 +26,10 @@ _PAIRS = 2_000_000
 
 def turns(case: Case, tally: Tally) -> Windows:
     """Of two trees the one grows whose turn it is."""
-    growth, counts, before = case.contract.growth, np.zeros(2, np.int64), -1
+    counts, before = np.zeros(2, np.int64), -1
     while True:
         window = yield
-        lines = case.scripts.of(window)
+        lines, growth = case.scripts.of(window), case.ruling(window).growth
         if growth is not None and growth.turn is not None and len(lines):
             chosen = np.flatnonzero(lines["kind"] == Kind.SAMPLE)
             edge = lines["kind"] == Kind.EDGE
@@ -57,45 +57,47 @@ def steering(case: Case, tally: Tally) -> Windows:
 
     Of more than 5,000 extensions so many are looked at; in trees of millions of nodes fewer.
     """
-    growth = case.contract.growth
     dtype = np.dtype([("aim", script_dtype(case.dof)), ("done", script_dtype(case.dof))])
     kept = Thinned(dtype, MOST)
     while True:
         window = yield
-        lines = case.scripts.of(window)
-        if growth is not None and len(lines):
-            rows = _aimed(case, growth, lines)
+        lines, contract = case.scripts.of(window), case.ruling(window)
+        if contract.growth is not None and len(lines):
+            rows = _aimed(contract, lines)
             rows = rows[kept.due(len(rows))]
             pairs = np.zeros(len(rows), dtype)
             pairs["aim"], pairs["done"] = lines[rows], lines[rows + 1]
             kept.keep(pairs)
         if window is None:
             break
-    if growth is not None and case.contract.step is not None:
-        for tree in case.trees:
-            _look_steered(case, tally, growth, tree, kept.rows())
+    pairs = kept.rows()
+    for number, (_, contract) in enumerate(case.stretches):
+        mine = pairs[case.stretch(pairs["aim"]) == number]
+        for tree in case.trees if len(mine) else ():
+            _look_steered(case, tally, contract, tree, mine)
 
 
-def _aimed(case: Case, growth: Growth, lines: Table) -> Ints:
+def _aimed(contract: Contract, lines: Table) -> Ints:
     """Lines that say what a tree heads for, where the next one says what came of that."""
     now, after = lines[:-1], lines[1:]
     moved = ((after["kind"] == Kind.EDGE) & (after["parent"] >= 0)) | (after["kind"] == Kind.REJECT)
-    if case.contract.near is None:
+    if contract.near is None:
         moved |= after["kind"] == Kind.CONNECT
     else:
         moved &= (after["kind"] != Kind.REJECT) | (after["why"] != Reason.LINK_BLOCKED)
     aimed = (now["kind"] == Kind.SAMPLE) & (
         (now["tree"] == after["tree"]) | (after["kind"] == Kind.CONNECT)
     )
-    if growth.links is not None:
+    if contract.growth is not None and contract.growth.links is not None:
         # Where the other tree goes on, it heads for the node that has just been added.
         aimed |= (now["kind"] == Kind.EDGE) & (after["tree"] == 1 - now["tree"])
     return np.flatnonzero(moved & aimed)
 
 
-def _look_steered(case: Case, tally: Tally, growth: Growth, tree: Grown, pairs: Table) -> None:
+def _look_steered(case: Case, tally: Tally, contract: Contract, tree: Grown, pairs: Table) -> None:
     """Hold the extensions of a tree to what is due."""
-    aim, done, step = pairs["aim"], pairs["done"], case.contract.step or 0.0
+    aim, done, step = pairs["aim"], pairs["done"], contract.step or np.inf
+    slices = 1 if contract.growth is None else contract.growth.slices
     number = np.where(aim["kind"] == Kind.SAMPLE, aim["tree"], 1 - aim["tree"])
     mine = number == tree.number
     aim, done = aim[mine], done[mine]
@@ -106,7 +108,7 @@ def _look_steered(case: Case, tally: Tally, growth: Growth, tree: Grown, pairs: 
     to = np.where(meets[:, None], target, to)
     origin = np.where(done["kind"] == Kind.EDGE, done["parent"], done["node"]).astype(np.int64)
     origin = np.where(meets & (tree.number == 1), done["parent"], origin)
-    if case.contract.near is not None:
+    if contract.near is not None:
         # The parent is chosen later, so where the extension came from is not said.
         near_blocked = (done["kind"] == Kind.REJECT) & (done["why"] == Reason.NEAR_BLOCKED)
         origin[(done["kind"] == Kind.EDGE) | near_blocked] = -1
@@ -121,7 +123,7 @@ def _look_steered(case: Case, tally: Tally, growth: Growth, tree: Grown, pairs: 
     close = said & (reach <= (least * (1 + CLOSE) + case.blur) * (1 + CLOSE) + 2 * case.blur)
     node = np.where(close, origin, node)
     part = np.minimum(1.0, step / np.maximum(least, 1e-300))
-    part = np.where(done["kind"] == Kind.EDGE, part / growth.slices, part)
+    part = np.where(done["kind"] == Kind.EDGE, part / slices, part)
     due = q[node] + part[:, None] * towards(case.robot, q[node], target)
     off = case.distance(due, to)
     wrong = (node < 0) | (said & ~close) | ~(off <= CLOSE * step + case.blur)
@@ -138,10 +140,10 @@ def _astray(to: Floats, due: Floats, node: Ints, i: int) -> str:
 
 def goal_tries(case: Case, tally: Tally) -> Windows:
     """Each new node that the goal may be joined to tries it."""
-    contract, growth = case.contract, case.contract.growth
     while True:
         window = yield
-        lines = case.scripts.of(window)
+        lines, contract = case.scripts.of(window), case.ruling(window)
+        growth = contract.growth
         if growth is not None and growth.goal_test and len(lines):
             after = followed(lines)[1:]
             far = case.distance(np.asarray(lines["q"]), case.goal[None])
@@ -167,12 +169,12 @@ def goal_tries(case: Case, tally: Tally) -> Windows:
 
 def link_tries(case: Case, tally: Tally) -> Windows:
     """Trees head for each other's newest nodes, and go on towards samples, as it was chosen."""
-    growth = case.contract.growth
     while True:
         window = yield
-        lines = case.scripts.of(window)
+        lines, contract = case.scripts.of(window), case.ruling(window)
+        growth = contract.growth
         if growth is not None and growth.links is not None and len(lines):
-            if case.contract.near is None:
+            if contract.near is None:
                 _look_acts(tally, growth, lines if window is None else followed(lines))
             elif not (window is None and case.cut):
                 _look_meetings(tally, lines)

@@ -123,10 +123,14 @@ def _with_path(case: Case) -> set[Status]:
 def budget(case: Case, tally: Tally) -> None:
     """No more iterations, draws and attempts to smooth than allowed."""
     scenario, events = case.manifest.scenario, case.events
-    made = last = case.kept.last_iteration
-    if scenario.settings().get("count_failed") is False:
-        # There, only draws that add a node count.
-        made = len(np.setdiff1d(events[Kind.EDGE]["iteration"], [0]))
+    last, made, begin = case.kept.last_iteration, 0, 0
+    adding = np.unique(events[Kind.EDGE]["iteration"])
+    ends = [*(branch.iteration for branch in case.manifest.branches), last]
+    for end, (_, ruling) in zip(ends, case.manifest.stretches, strict=True):
+        # Where failed draws do not count, only those that add a node do.
+        sparing = ruling.settings().get("count_failed") is False
+        made += int(((begin < adding) & (adding <= end)).sum()) if sparing else end - begin
+        begin = end
     limits = [("iterations", made, scenario.iterations), ("draws", last, scenario.draws)]
     limits.append(("attempts to smooth", len(events[Kind.SHORTCUT]), scenario.shortcuts))
     for what, count, limit in limits:

@@ -1,5 +1,7 @@
 """A log as a planner acts it out: iteration after iteration, in one table."""
 
+from collections.abc import Set as AbstractSet
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,9 +57,11 @@ class Scripts:
 
     Args:
         dof: Numbers in a configuration.
+        firsts: Events that an iteration begins with in any case, since other settings rule it.
     """
 
-    def __init__(self, dof: int) -> None:
+    def __init__(self, dof: int, firsts: AbstractSet[int]) -> None:
+        self._firsts = firsts
         self._window: Events | None = None
         self._held = self._made = np.empty(0, script_dtype(dof))
         self._ended = False
@@ -71,6 +75,8 @@ class Scripts:
             lines = np.concatenate([self._held, script(window)])
             samples = np.flatnonzero(lines["kind"] == Kind.SAMPLE)
             end = int(samples[-1]) if len(samples) else 0
+            if len(lines) and int(lines["seq"][-1]) + 1 in self._firsts:
+                end = len(lines)
             self._made, self._held, self._window = lines[:end], lines[end:], window
         return self._made
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Table
-from brrt.replay.checks.case import Case, Grown
+from brrt.replay.checks.case import Case, Grown, folded
 from brrt.replay.checks.log import text
 from brrt.replay.checks.tally import Tally
-from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions, fold
+from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions
 
 Floats = NDArray[np.float64]
 
@@ -54,18 +54,21 @@ def roots(case: Case, tally: Tally) -> None:
 
 def edge_lengths(case: Case, tally: Tally) -> None:
     """Edges are no longer than the step; to the goal they may be, by line of sight."""
-    step = case.contract.step
-    for tree in case.trees if step is not None else ():
+    stepping = any(contract.step is not None for _, contract in case.stretches)
+    sees = np.array([contract.line_of_sight for _, contract in case.stretches])
+    for tree in case.trees if stepping else ():
         lengths, verdict = tree.of_edges(tree.length), tree.of_edges(tree.ledger.verdict)
         for span in tree.spans():
             edges, length = tree.edges[span], lengths[span]
+            step = case.limits(edges, lambda contract: contract.step)
             there = np.isfinite(length) | (edges["parent"] >= 0)
-            wrong = there & ~case.at_most(length, step or 0.0) & (verdict[span] == SOUND)
-            if case.contract.line_of_sight:
-                wrong &= (np.asarray(edges["q"]) != case.goal).any(axis=1)
+            wrong = there & ~case.at_most(length, step) & (verdict[span] == SOUND)
+            wrong &= ~sees[case.stretch(edges)] | (np.asarray(edges["q"]) != case.goal).any(axis=1)
             tally.look(
                 edges[there], wrong[there],
-                lambda i, n=length[there]: f"edge of {n[i]:.12g}; the step is {step:.12g}",  # type: ignore[misc]
+                lambda i, n=length[there], s=step[there]: (  # type: ignore[misc]
+                    f"edge of {n[i]:.12g}; the step is {s[i]:.12g}"
+                ),
             )  # fmt: skip
 
 
@@ -143,12 +146,16 @@ def rewires_gain(case: Case, tally: Tally) -> None:
 
 def rewires_near(case: Case, tally: Tally) -> None:
     """A rewire's new parent is within the radius that the planner promises."""
-    near = case.contract.near
-    for tree in case.trees if near is not None else ():
+    nears = [contract.near for _, contract in case.stretches]
+    for tree in case.trees if any(nears) else ():
         sound = tree.of_rewires(tree.ledger.verdict == SOUND)
         nodes = tree.of_rewires(np.cumsum(tree.made.joins))[sound]
-        radius = near.radius(nodes) if near is not None else nodes
         length, table = tree.of_rewires(tree.length)[sound], tree.rewires[sound]
+        radius, stretch = np.full(len(nodes), np.inf), case.stretch(table)
+        for number, near in enumerate(nears):
+            mine = stretch == number
+            if near is not None:
+                radius[mine] = near.radius(nodes[mine])
         tally.look(
             table, ~case.at_most(length, radius),
             lambda i, n=length, r=radius: f"a parent {n[i]:.12g} away; the radius is {r[i]:.12g}",  # type: ignore[misc]
@@ -176,10 +183,10 @@ def links(case: Case, tally: Tally) -> None:
     sound, a, b = table[there], a[there], b[there]
     length = case.distance(a, b)
     cost = (cost_a + cost_b)[there] + length
-    if case.contract.link is not None:
-        limit = case.contract.link
+    limit = case.limits(sound, lambda contract: contract.link)
+    if np.isfinite(limit).any():
         long = ~case.at_most(length, limit)
-        tally.look(sound, long, lambda i: f"link of {length[i]:.12g}; the limit is {limit:.12g}")
+        tally.look(sound, long, lambda i: f"link of {length[i]:.12g}; the limit is {limit[i]:.12g}")
     tally.look(
         sound, ~case.same(np.asarray(sound["cost"]), cost),
         lambda i: f"said to cost {sound['cost'][i]:.12g}; it costs {cost[i]:.12g}",
@@ -193,7 +200,7 @@ def _asked(case: Case, number: int, table: Table, name: str) -> tuple[Floats, Fl
     for tree in case.trees:
         if tree.number == number and len(table):
             node = table[name].astype(np.int64)
-            cost = fold(tree.made, tree.length, Questions(table["seq"], node)).answers
+            cost = folded(tree.made, tree.length, Questions(table["seq"], node)).answers
             there = np.isfinite(cost)
             q[there] = tree.edges["q"][node[there]]
     return q, cost

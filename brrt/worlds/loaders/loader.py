@@ -14,7 +14,8 @@ from brrt.worlds.world import World
 
 MOST_BYTES = 64_000_000
 """Bytes of a text file, at most."""
-_MOST_LISTS = 5_000_000
+MOST_LISTS = 5_000_000
+"""In JSON, each of which takes a hundred bytes once it is parsed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +90,8 @@ def json_text(path: Path) -> str:
         BrrtError: It cannot be read, is too long, or holds millions of lists.
     """
     text = read_text(path, "a world", MOST_BYTES)
-    if text.count("[") + text.count("{") > _MOST_LISTS:
-        raise BrrtError(f"{path}: more than {_MOST_LISTS:,} lists; that is too much for a world")
+    if text.count("[") + text.count("{") > MOST_LISTS:
+        raise BrrtError(f"{path}: more than {MOST_LISTS:,} lists; that is too much for a world")
     return text
 
 

@@ -1,0 +1,108 @@
+"""A whole file out of one that was cut or damaged."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from brrt.errors import BrrtError, RecordingError
+from brrt.files import replacing
+from brrt.recording.mcap_writer import McapSink
+from brrt.recording.recording import Recording
+from brrt.recording.sound import CutError, DamagedError
+
+NOTE = "brrt.recovered"
+"""Name of what a recovered file says of its origin."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """What was saved.
+
+    Attributes:
+        events: How many.
+        until_s: When the last of them happened, in seconds of the run.
+        lost: What is wrong with the file; None if it is whole.
+        ended: Whether the run came to its own end, so that only what stands behind its events was
+            lost.
+    """
+
+    events: int
+    until_s: float
+    lost: str | None
+    ended: bool
+
+
+def recover(cut: Path | str, whole: Path | str) -> Recovery:
+    """Write what is sound of a recording into a new file, which lacks nothing that a file has.
+
+    Index, statistics and checksums are made anew. The run's figures are written where the run came
+    to its end; otherwise the file says what it was made of (`NOTE`).
+
+    Args:
+        cut: The recording, .mcap or .rrd, as it was left.
+        whole: The new file, .mcap or .rrd; it is there once it is complete.
+
+    Raises:
+        BrrtError: Nothing can be saved, or the file cannot be written.
+    """
+    cut, whole = Path(cut), Path(whole)
+    if whole.exists() and cut.exists() and whole.samefile(cut):
+        raise BrrtError(f"{whole}: is the recording itself; choose another name")
+    recording = _read(cut)
+    with replacing(whole) as unfinished:
+        sink = _sink(unfinished, recording)
+        try:
+            recovery = _copy(recording, sink)
+            if recovery.lost is not None:
+                sink.annotate(NOTE, _note(cut, recovery))
+        except BaseException:
+            sink.close(whole=False)
+            raise
+        sink.close(whole=recovery.ended)
+    return recovery
+
+
+def _read(path: Path) -> Recording:
+    """Open a recording; where the checksum of an .rrd is wrong, those of its parts decide."""
+    from brrt.recording import read  # noqa: PLC0415 - it exports `recover`
+
+    try:
+        return read(path)
+    except DamagedError:
+        from brrt.recording.rrd_reader import read_rerun  # noqa: PLC0415 - pyarrow is slow to load
+
+        return read_rerun(path, in_parts=True)
+
+
+def _sink(path: Path, recording: Recording) -> Any:
+    if path.suffix == ".rrd":
+        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
+
+        return RerunSink(recording.manifest, recording.world, path=path)
+    return McapSink(path, recording.manifest, recording.world)
+
+
+def _copy(recording: Recording, sink: Any) -> Recovery:
+    """Hand a sink the events as far as they are sound."""
+    count, last, lost, ended = 0, 0, None, recording.result is not None
+    batches = recording.batches()
+    while True:
+        try:
+            batch = next(batches, None)
+        except CutError as error:
+            lost, ended, batch = str(error), error.result is not None, None
+        except RecordingError as error:
+            lost, ended, batch = str(error), False, None
+        if batch is None:
+            return Recovery(count, last / 1e9, lost, ended)
+        sink.write(batch)
+        count, last = count + len(batch), max(last, batch.last.t)
+
+
+def _note(cut: Path, recovery: Recovery) -> dict[str, str]:
+    return {
+        "from": cut.name,
+        "events": str(recovery.events),
+        "until_s": f"{recovery.until_s:.9f}",
+        "lost": (recovery.lost or "").replace(str(cut), cut.name),
+    }

@@ -1,0 +1,278 @@
+"""All that an explanation knows: figures, each computed from the recording."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Reason, Source
+from brrt.planners import PLANNERS
+from brrt.planners.contract import Contract
+from brrt.replay.account import choice_name
+from brrt.replay.explain.gather import FAILED, Gather
+from brrt.replay.explain.places import Blocker, Coverage, Gap, Narrow, Places, Spot
+from brrt.replay.history import as_plain
+from brrt.robots import Robot
+from brrt.scenario import Manifest, Scenario
+from brrt.worlds.world import World
+
+Floats = NDArray[np.float64]
+
+TENTHS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Tenth:
+    """A tenth of the run, by iterations.
+
+    Attributes:
+        last: Its last iteration.
+        accepted: Share of the extensions that added a node, or of the expansions that were of
+            cells not expanded before; None where there were none.
+        us: Microseconds an iteration; None where nobody measured.
+        nearest: How near to the goal anything had come by its end; None where nothing had.
+    """
+
+    last: int
+    accepted: float | None
+    us: float | None
+    nearest: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """How near to the goal the run came.
+
+    Attributes:
+        far: Distance from there, in the robot's metric.
+        start: How far the start is.
+        q: The nearest node, or cell.
+        node: Its number.
+        iteration: When it was reached.
+        since: Share of the iterations that came after it.
+        hit: What is on the straight way from it to the goal; None where nothing is.
+    """
+
+    far: float
+    start: float
+    q: list[float]
+    node: int
+    iteration: int
+    since: float
+    hit: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Goals:
+    """Draws of the goal, and tries to join it.
+
+    Attributes:
+        drawn: Samples that were the goal.
+        failed: Of those, how many were rejected.
+        blocked: Tries to join the goal to the newest node that were blocked.
+        blockers: What was in the way of both.
+    """
+
+    drawn: int
+    failed: int
+    blocked: int
+    blockers: list[Blocker]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """The paths that the planner found, in the order in which it did.
+
+    Attributes:
+        paths: How many.
+        first: Iteration of the first.
+        first_cost: Its cost.
+        best: Iteration of the last, which is the best where a planner improves its path.
+        best_cost: Its cost.
+        half_cost: What the path cost after half of the iterations; None before the first.
+    """
+
+    paths: int
+    first: int
+    first_cost: float
+    best: int
+    best_cost: float
+    half_cost: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of a run.
+
+    Attributes:
+        manifest: The run's.
+        contract: What its planner promises, as its step; None where it is not known here.
+        extent: The longest side of the world's bounds.
+        figures: Those that `brrt replay --json` prints.
+        tenths: The run's course.
+        accepted: Extensions that added a node, or first expansions of cells.
+        failed: Extensions that added none, or further expansions of cells.
+        reasons: Rejections by reason, most frequent first.
+        blockers: What turned extensions down.
+        spot: Where most were turned down.
+        goals: What came of heading for the goal.
+        approach: How near to it the run came.
+        gap: How near two trees came to each other.
+        coverage: How much of the free space was reached.
+        connected: Whether there is a way for a point: True and False are proven.
+        way: What that rests on.
+        narrow: The narrowest place on it.
+        progress: The paths.
+        cells: What a search on a lattice did; empty for others.
+    """
+
+    manifest: Manifest
+    contract: Contract | None
+    extent: float
+    figures: dict[str, Any]
+    tenths: list[Tenth]
+    accepted: int
+    failed: int
+    reasons: dict[str, int]
+    blockers: list[Blocker]
+    spot: Spot | None
+    goals: Goals | None
+    approach: Approach | None
+    gap: Gap | None
+    coverage: Coverage | None
+    connected: bool | None
+    way: str
+    narrow: Narrow | None
+    progress: Progress | None
+    cells: dict[str, Any]
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        return self.manifest.scenario
+
+    @property
+    def acceptance(self) -> float | None:
+        """Share of the extensions that added a node."""
+        tried = self.accepted + self.failed
+        return self.accepted / tried if tried else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all but the manifest as plain numbers, texts, lists and dicts."""
+        plain: dict[str, Any] = as_plain(self)
+        del plain["manifest"]
+        return {**plain, "acceptance": self.acceptance}
+
+
+def facts(manifest: Manifest, world: World, robot: Robot, gather: Gather) -> Facts:
+    """Compute everything.
+
+    Args:
+        manifest: The run's.
+        world: The run's.
+        robot: What moves, settled in the world.
+        gather: What the log says.
+    """
+    places = Places(world, robot, gather)
+    start, goal = np.array(manifest.start), np.array(manifest.goal)
+    figures = gather.metrics.as_dict()
+    rejects = gather.rejects.rows()
+    ends = gather.origins(rejects), np.asarray(rejects["q"])
+    connected, way, narrow = places.narrow(start, goal)
+    return Facts(
+        manifest=manifest,
+        contract=_contract(manifest, world),
+        extent=world.extent,
+        figures=figures,
+        tenths=_tenths(gather, figures["iterations"], manifest.scenario.clock == "logical"),
+        accepted=int(gather.spans.sums[:, 0].sum()),
+        failed=int(gather.spans.sums[:, 1].sum()),
+        reasons={choice_name(Reason, reason): n for reason, n in gather.reasons.most_common()},
+        blockers=places.blockers(*ends),
+        spot=places.spot(*ends),
+        goals=_goals(gather, places),
+        approach=_approach(gather, places, start, goal, robot, figures["iterations"]),
+        gap=places.gap() if not figures["solved"] else None,
+        coverage=places.coverage(*_reached(gather), figures["iterations"]),
+        connected=connected,
+        way=way,
+        narrow=narrow,
+        progress=_progress(gather, figures["iterations"]),
+        cells=gather.cells.as_dict(),
+    )
+
+
+def _contract(manifest: Manifest, world: World) -> Contract | None:
+    scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
+    if scenario.planner not in PLANNERS:
+        return None
+    return scenario.make_planner().contract(scenario.make_problem(world))
+
+
+def _tenths(gather: Gather, last: int, logical: bool) -> list[Tenth]:
+    spans = gather.spans
+    used = last // spans.length + 1
+    ends = np.unique(np.linspace(0, used, TENTHS + 1).astype(np.int64))
+    t = np.maximum.accumulate(spans.t)
+    nearest = np.minimum.accumulate(spans.nearest)
+    found = []
+    for first, end in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True):
+        good, bad = spans.sums[first:end].sum(axis=0).tolist()
+        before = int(t[first - 1]) if first else int(spans.began)
+        iterations = min(end * spans.length - 1, last) - max(first * spans.length - 1, 0)
+        us = (int(t[end - 1]) - before) / 1e3 / max(iterations, 1)
+        near = float(nearest[end - 1])
+        found.append(
+            Tenth(
+                min(end * spans.length - 1, last),
+                good / (good + bad) if good + bad else None,
+                None if logical else us,
+                near if np.isfinite(near) else None,
+            )
+        )
+    return found
+
+
+def _goals(gather: Gather, places: Places) -> Goals | None:
+    drawn = gather.drawn[int(Source.GOAL)]
+    blocked = gather.reasons[int(Reason.GOAL_BLOCKED)]
+    if not drawn and not blocked:
+        return None
+    rows = gather.goal_rejects.rows()
+    found = places.blockers(gather.origins(rows), np.asarray(rows["q"]))
+    return Goals(drawn, gather.goal_failed, blocked, found)
+
+
+def _approach(
+    gather: Gather, places: Places, start: Floats, goal: Floats, robot: Robot, last: int
+) -> Approach | None:
+    near = gather.nearest
+    if near is None:
+        return None
+    hit = places.in_the_way(np.array(near.q), goal) if near.far > 0 else None
+    far, since = float(robot.distance(start, goal)), 1 - near.iteration / max(last, 1)
+    return Approach(near.far, far, near.q, near.node, near.iteration, since, hit)
+
+
+def _reached(gather: Gather) -> tuple[Floats, NDArray[np.int64]]:
+    """Return what was reached by any tree, and when; of cells the time is not kept."""
+    if not gather.trees:
+        q = gather.cells.q
+        return q, np.zeros(len(q), np.int64)
+    return (
+        np.concatenate([gather.nodes(tree) for tree in gather.trees]),
+        np.concatenate([gather.iterations(tree) for tree in gather.trees]),
+    )
+
+
+def _progress(gather: Gather, last: int) -> Progress | None:
+    paths = gather.paths
+    if not paths:
+        return None
+    half = [cost for iteration, _, cost in paths if iteration <= last / 2]
+    (first, _, first_cost), (best, _, best_cost) = paths[0], paths[-1]
+    return Progress(len(paths), first, first_cost, best, best_cost, half[-1] if half else None)
+
+
+__all__ = ["FAILED", "Facts", "Tenth", "facts"]

@@ -1,0 +1,254 @@
+"""A gate on the figures of many seeds: did a change make a planner worse by more than a margin?
+
+Runs of the same seed are pairs. Of each figure it is tested whether the new one, divided by
+1 + margin, is larger than the old one: by Wilcoxon's signed ranks on the logarithms, with the exact
+distribution. That paths are no longer found is tested by McNemar's exact test. Where the change
+does no harm beyond the margins, that is where within each pair old and scaled new could as well be
+swapped, or the new is smaller, all tests together fail with a chance of at most alpha (Bonferroni).
+Nothing is assumed of how the figures are distributed. A gate always comes to the same verdict on
+the same code, so it does not fail today and pass tomorrow.
+
+`benchmarks/gate.py` measures false alarms, and what is found with which chance.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brrt.errors import BrrtError, unknown
+from brrt.testing import ranks
+from brrt.testing.figures import PROBLEM, Figures, Source
+
+ALPHA = 0.01
+"""Chance of a false alarm."""
+
+SEEDS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What became of one figure.
+
+    Attributes:
+        name: The figure.
+        margin: Relative increase that is allowed; None for `solved`, where none is.
+        old: Median, infinite where most runs found no path; of `solved`, how many did.
+        new: The same of the new runs.
+        at_least: Relative increase that the data prove, at the confidence of this test.
+        p: How likely figures this much worse are where no harm was done.
+        passed: Whether p is above this test's share of alpha.
+        worst: Seed whose figure grew most.
+    """
+
+    name: str
+    margin: float | None
+    old: float
+    new: float
+    at_least: float
+    p: float
+    passed: bool
+    worst: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a gate found.
+
+    Attributes:
+        name: What was judged.
+        seeds: How many pairs.
+        alpha: Chance of a false alarm, over all figures.
+        identical: Whether each run's figures are the old ones, to the last bit.
+        figures: One for each test.
+    """
+
+    name: str
+    seeds: int
+    alpha: float
+    identical: bool
+    figures: tuple[Judged, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether none was made worse beyond its margin."""
+        return all(each.passed for each in self.figures)
+
+    def lines(self) -> list[str]:
+        """Tell it in plain text of 80 columns."""
+        outcome = "passed" if self.passed else "FAILED"
+        head = f"{self.name}: {outcome}, {self.seeds} seeds"
+        if self.identical:
+            return [f"{head}, each the same to the last bit"]
+        share = self.alpha / len(self.figures)
+        rows = [_ROW.format("", "old", "new", "change", "proven", "allowed", "p", "").rstrip()]
+        rows += [_row(each, self.seeds) for each in self.figures]
+        rows += [
+            f"failed where p <= {share:.2g}: a false alarm once in {1 / self.alpha:,.0f} changes"
+        ]
+        for each in self.figures:
+            if not each.passed and each.worst is not None:
+                rows.append(f"look at seed {each.worst}, whose {each.name} grew most")
+        return [head, *rows]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        names = ("margin", "old", "new", "at_least", "p", "passed", "worst")
+        figures = {
+            each.name: {name: _plain(getattr(each, name)) for name in names}
+            for each in self.figures
+        }
+        return {
+            "name": self.name, "passed": self.passed, "seeds": self.seeds, "alpha": self.alpha,
+            "identical": self.identical, "figures": figures,
+        }  # fmt: skip
+
+
+_ROW = "  {:22}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9} {}"
+
+
+def gate(
+    new: Source | Figures,
+    against: Source | Figures | Path | str,
+    *,
+    seeds: int | Iterable[int] = SEEDS,
+    alpha: float = ALPHA,
+    name: str = "gate",
+    **margins: float,
+) -> Verdict:
+    r"""Judge whether new runs are worse than old ones by more than the margins.
+
+        found = brrt.gate(new, old, seeds=20, cost=0.02, iterations=0.10)
+        print(*found.lines(), sep="\n")
+
+    Args:
+        new: A scenario, a function that makes a run or its figures of a seed, or figures at hand.
+        against: The same, or a file of `Figures`.
+        seeds: How many, from 0 on, or which.
+        alpha: Chance of a false alarm over all figures together.
+        name: What the verdict calls it.
+        margins: For each figure, the relative increase that is allowed: `cost` (of the final path)
+            or any count or cost that `brrt plan --json` prints. A run that found no path counts as
+            worse than any that did.
+
+    Raises:
+        BrrtError: A figure is unknown, the seeds are too few to find anything, or the two are
+            runs of different problems.
+    """
+    numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
+    check_question(numbers, alpha, margins)
+    old = _figures(against, "the old runs", numbers)
+    return judge(
+        _figures(new, "the new runs", numbers), old, alpha=alpha, name=name, margins=margins
+    )
+
+
+def judge(
+    new: Figures, old: Figures, *, alpha: float, name: str, margins: Mapping[str, float]
+) -> Verdict:
+    """Judge figures at hand; both have the seeds of the new ones."""
+    _check_problem(new, old)
+    seeds = list(new.runs)
+    pairs = [(old.runs[seed], new.runs[seed]) for seed in seeds]
+    share = alpha / (len(margins) + 1)
+    judged = [_solved(pairs, share)]
+    known = set().union(*old.runs.values(), *new.runs.values()) - {"solved"}
+    for figure, margin in margins.items():
+        # Where no run found a path, none has a cost, and its name is as good as any.
+        if figure not in known and any(run["solved"] for pair in pairs for run in pair):
+            raise unknown("figure", figure, known)
+        judged.append(_judge(figure, margin, pairs, seeds, share))
+    identical = all(a[figure] == b[figure] for a, b in pairs for figure in a.keys() & b.keys())
+    return Verdict(name, len(seeds), alpha, identical, tuple(judged))
+
+
+def _judge(
+    name: str, margin: float, pairs: list[tuple[Any, Any]], seeds: list[int], share: float
+) -> Judged:
+    old, new = (
+        np.array([_value(pair[side], name) for pair in pairs], np.float64) for side in (0, 1)
+    )
+    grown = ranks.log_ratios(old, new)
+    p = ranks.signed_rank(ranks.log_ratios(old, new / (1 + margin)))
+    proven = ranks.at_least(grown, share)
+    return Judged(
+        name, margin, float(np.median(old)), float(np.median(new)),
+        math.expm1(proven), p, p > share, seeds[int(np.argmax(grown))],
+    )  # fmt: skip
+
+
+def _solved(pairs: list[tuple[Any, Any]], share: float) -> Judged:
+    old, new = ([bool(pair[side]["solved"]) for pair in pairs] for side in (0, 1))
+    lost = sum(a and not b for a, b in zip(old, new, strict=True))
+    p = ranks.sign_test(lost, sum(b and not a for a, b in zip(old, new, strict=True)))
+    return Judged("solved", None, sum(old), sum(new), -math.inf, p, p > share, None)
+
+
+def _value(run: Mapping[str, Any], name: str) -> float:
+    value = run.get(name)
+    return math.inf if value is None or not run["solved"] else float(value)
+
+
+def _figures(source: Source | Figures | Path | str, name: str, seeds: list[int]) -> Figures:
+    if isinstance(source, Path | str):
+        name, source = str(source), Figures.load(Path(source))
+    if not isinstance(source, Figures):
+        return Figures.of(source, seeds)
+    for seed in seeds:
+        if seed not in source.runs:
+            raise BrrtError(f"{name}: no figures of seed {seed}; renew them with all seeds")
+    return source.of_seeds(seeds)
+
+
+def check_question(seeds: list[int], alpha: float, margins: Mapping[str, Any]) -> None:
+    """Refuse a question that has no answer, before anything is run for it.
+
+    Raises:
+        BrrtError: The seeds are too few or the same, or a number is out of range.
+    """
+    if not 0 < alpha < 1:
+        raise BrrtError(f"alpha must be a chance between 0 and 1, not {alpha!r}")
+    for name, margin in margins.items():
+        if not isinstance(margin, int | float) or not 0 <= margin < math.inf:
+            raise BrrtError(f"margin of {name} must be from 0 on (0.02: 2 %), not {margin!r}")
+    if len(set(seeds)) < len(seeds):
+        raise BrrtError("seeds must differ from each other")
+    least = math.ceil(math.log2((len(margins) + 1) / alpha))
+    if len(seeds) < least:
+        raise BrrtError(
+            f"{len(seeds)} seeds prove nothing at alpha={alpha:g} with {len(margins)} figures; "
+            f"give at least {least}, better {SEEDS}"
+        )
+
+
+def _check_problem(new: Figures, old: Figures) -> None:
+    if new.scenario is None or old.scenario is None:
+        return
+    for key in PROBLEM:
+        if new.scenario.get(key) != old.scenario.get(key):
+            ours, theirs = (f"{each.scenario.get(key)!r}" for each in (new, old) if each.scenario)
+            raise BrrtError(f"two problems, not two planners: {key} {ours} against {theirs}")
+
+
+def _row(each: Judged, seeds: int) -> str:
+    mark = "" if each.passed else "FAIL"
+    p = f"{each.p:.2g}"
+    if each.margin is None:
+        counts = (f"{count:.0f}/{seeds}" for count in (each.old, each.new))
+        return _ROW.format(each.name, *counts, "", "", "", p, mark).rstrip()
+    medians = ["no path" if math.isinf(m) else f"{m:.5g}" for m in (each.old, each.new)]
+    told = each.old > 0 and "no path" not in medians
+    change = _percent(each.new / each.old - 1) if told else ""
+    proven = _percent(each.at_least) if math.isfinite(each.at_least) else ""
+    return _ROW.format(each.name, *medians, change, proven, _percent(each.margin), p, mark).rstrip()
+
+
+def _percent(ratio: float) -> str:
+    return f"{100 * ratio:+.3g} %"
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

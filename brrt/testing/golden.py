@@ -1,0 +1,112 @@
+"""Golden runs: kept as small recordings, and held against what is planned today."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from brrt.again import RepeatedRun
+from brrt.errors import BrrtError, RecordingError
+from brrt.events import Events
+from brrt.files import replacing
+from brrt.planners import PLANNERS
+from brrt.recording import McapSink, Memory, Recording, read
+from brrt.run import Run
+from brrt.scenario import Scenario
+
+TICK_NS = 1000
+"""Between two events by the logical clock."""
+
+Source = Scenario | Run | Recording | Path | str
+"""A scenario or a run to be made, or one that was recorded: by brrt, or as MCAP by anybody."""
+
+
+def fresh(source: Source) -> Recording:
+    """Make the run, or read it; by the logical clock, so that equal runs give equal files.
+
+    Args:
+        source: What to run; or a recording; or the name of a scenario (.toml) or recording.
+
+    Raises:
+        BrrtError: It is of no use, or its budget is a time, so that no two runs of it are alike.
+    """
+    given: Any = source
+    if isinstance(given, Path | str):
+        path = Path(given)
+        given = Scenario.load(path) if path.suffix == ".toml" else read(path)
+    if isinstance(given, Scenario):
+        _check_budget(given)
+        given = Run(replace(given, clock="logical"))
+    if isinstance(given, Run):
+        given = _made(given)
+    if not isinstance(given, Recording):
+        kinds = "a Scenario, a Run, a Recording or a file"
+        raise BrrtError(f"give {kinds} to compare with, not {given!r}")
+    return _by_logical_clock(given)
+
+
+def _made(run: Run) -> Recording:
+    _check_budget(run.manifest.scenario)
+    log = Memory()
+    result = run.execute([log]).as_dict()
+    if log.batches[0].kinds_in_order()[0] != 0:
+        raise BrrtError("this Run has been made before; give a new one")
+    return Recording(run.manifest, run.problem.world, lambda: iter(log.batches), result)
+
+
+def again(path: Path) -> Run:
+    """Return the run that makes a golden one anew, in the world that it has kept.
+
+    Raises:
+        BrrtError: The file cannot be read, or its planner is not one of brrt's.
+    """
+    kept = read(path)
+    planner = kept.manifest.scenario.planner
+    if planner not in PLANNERS:
+        raise BrrtError(f"{path}: planner {planner} is not brrt's own; give the run as well")
+    return RepeatedRun(kept.manifest, kept.world)
+
+
+def save(recording: Recording, path: Path) -> None:
+    """Write a recording; the name is that of a whole file, the old one or the new one.
+
+    Raises:
+        RecordingError: It cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
+    with replacing(path) as unfinished, ExitStack() as stack:
+        sink = McapSink(unfinished, recording.manifest, recording.world)
+        stack.callback(sink.close, whole=False)
+        for batch in recording.batches():
+            sink.write(batch)
+        stack.pop_all()
+        sink.close(whole=True)
+
+
+def _check_budget(scenario: Scenario) -> None:
+    if scenario.time is not None:
+        raise BrrtError(
+            "a budget of time ends each run elsewhere; give a golden run iterations and no time"
+        )
+
+
+def _by_logical_clock(recording: Recording) -> Recording:
+    """Return a recording whose event n happened at n us."""
+    scenario = recording.manifest.scenario
+    if scenario.clock == "logical":
+        return recording
+    manifest = replace(recording.manifest, scenario=replace(scenario, clock="logical"), epoch_ns=0)
+
+    def batches() -> Iterator[Events]:
+        for batch in recording.batches():
+            tables = {kind: table.copy() for kind, table in batch.tables.items()}
+            for table in tables.values():
+                table["t"] = TICK_NS * table["seq"]
+            yield Events(batch.dof, tables)
+
+    # The figures that the writer found hold times of the real clock.
+    return replace(recording, manifest=manifest, batches=batches, result=None)

@@ -1,0 +1,55 @@
+"""`brrt explain`: why a run failed, or took long."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .console import note, out, print_json, print_pairs
+from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
+from .saved import Saved
+
+
+def explain(
+    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
+    at: At = None,
+    at_event: AtEvent = None,
+    at_iteration: AtIteration = None,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object with every figure.")
+    ] = False,
+) -> None:
+    """Say why a run failed, or took long, by figures from its recording, and what to try.
+
+    Shares of the free space are counted in coarse cells, 16 x 16 or 8 x 8 x 8; widths are those
+    of the widest way from start to goal for a point, at its narrowest place, measured in cells.
+
+    brrt explain run.mcap
+
+    brrt explain run.mcap --at-iteration 400
+
+    brrt explain run.mcap --json
+    """
+    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+    from brrt.replay.explain import explain as explained  # noqa: PLC0415
+    from brrt.replay.moment import Moment  # noqa: PLC0415
+
+    limits = instant(at, at_event, at_iteration)
+    recording = read(run)
+    batches = Counted(Saved(recording, partial=partial, verb="explain them"))
+    moment = Moment(recording.manifest, recording.world, lambda: iter(batches), limits)
+    found = explained(moment)
+    late = beyond(limits, batches.count, batches.last)
+    if late is not None:
+        note(f"{late}; this is how it stood then")
+    if as_json:
+        print_json(found.as_dict())
+        return
+    print_pairs((name, text, "") for name, text in found.rows())
+    for i, advice in enumerate(found.advice):
+        out.print()
+        out.print(f"{i + 1}. {advice.why}", markup=False)
+        out.print(f"   {advice.command}", style="bold", markup=False, soft_wrap=True)

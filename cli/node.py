@@ -1,0 +1,176 @@
+"""`brrt replay --node`: what became of a node of a tree, or of a cell of a lattice."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from .console import print_json, print_pairs, seconds
+
+if TYPE_CHECKING:
+    from brrt.replay.cells import CellHistory
+    from brrt.replay.history import NodeHistory, When
+    from brrt.replay.moment import Moment
+
+_SHOWN = 5
+"""Events of a kind that are listed; of more, the first and the last."""
+
+_TREES = {"start": 0, "goal": 1}
+
+Rows = Iterator[tuple[str, str]]
+
+
+def tree_number(tree: str | None) -> int:
+    """Read the number of a tree, or what it grows from.
+
+    Raises:
+        BrrtError: It is neither.
+    """
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+
+    if tree is None:
+        return 0
+    if tree not in _TREES and not (tree.isdecimal() and int(tree) < 256):
+        raise BrrtError(f"--tree must be start, goal or a number like 0 and 1, not {tree!r}")
+    return _TREES[tree] if tree in _TREES else int(tree)
+
+
+def show_node(moment: "Moment", node: int, tree: int, *, as_json: bool) -> None:
+    """Print a node's history up to an instant, or a cell's.
+
+    Raises:
+        BrrtError: There was no such node.
+    """
+    from brrt.replay.history import NodeHistory  # noqa: PLC0415
+
+    found = moment.node(node, tree)
+    if as_json:
+        print_json(found.as_dict())
+        return
+    rows = _of_node(found) if isinstance(found, NodeHistory) else _of_cell(found)
+    print_pairs((name, text, "") for name, text in rows)
+
+
+def _of_node(h: "NodeHistory") -> Rows:
+    from brrt.replay.history import tree_name  # noqa: PLC0415
+
+    yield "node", f"{h.node:,} of tree {h.tree} ({tree_name(h.tree)}) at {_place(h.q)}"
+    parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"
+    yield "born", f"{_when(h.born)}; {parent}, cost {h.born_cost:.6g}"
+    if h.sample is not None:
+        other = "" if h.sample.tree == h.tree else f" for tree {h.sample.tree}"
+        drawn = f"{h.sample.source}{other}, {_place(h.sample.q)}"
+        yield "sample", f"event {h.sample.when.event:,}: {drawn}"
+    yield from _listed(
+        "rewired",
+        [
+            f"{_when(turn.when)}; parent {turn.old_parent:,} -> {turn.parent:,}, "
+            f"cost {turn.before:.6g} -> {turn.after:.6g}"
+            for turn in h.rewires
+        ],
+    )
+    yield from _listed(
+        "followed",
+        [
+            f"{_when(turn.when)}; ancestor {turn.node:,} rewired, "
+            f"cost {turn.before:.6g} -> {turn.after:.6g}"
+            for turn in h.follows
+        ],
+    )
+    if h.rewires or h.follows:
+        yield "now", f"child of {h.parent:,}, cost {h.cost:.6g}"
+    yield (
+        "below",
+        f"{_count(len(h.children), 'child', 'children')}{_some(h.children)}, "
+        + _count(h.descendants, "descendant"),
+    )
+    yield "way", _way(h.lineage)
+    on = [f"waypoint {i} of the {stage} path" for stage, i in h.paths.items()]
+    yield "path", ", ".join(on) or "on no path that stands"
+    yield from _rejects(h)
+
+
+def _rejects(h: "NodeHistory") -> Rows:
+    if not h.rejects:
+        yield "rejected", "no extension from it"
+        return
+    extensions = _count(len(h.rejects), "extension")
+    yield "rejected", f"{extensions} from it: {_counts(h.reasons())}"
+    if h.hits():
+        yield "", f"in the way: {_counts(h.hits())}"
+    told = [
+        f"{_when(each.when)}; {each.reason} towards {_place(each.q)}"
+        + (f", {each.hit}" if each.hit else "")
+        for each in h.rejects
+    ]
+    yield from _listed("", told)
+
+
+def _of_cell(h: "CellHistory") -> Rows:
+    yield "cell", f"{h.cell:,} at {_place(h.q)}, {h.distance:.6g} from the goal"
+    times = _count(len(h.looks), "time")
+    yield "expanded", times
+    yield from _listed(
+        "",
+        [
+            f"{_when(look.when)}; "
+            + ("where the search began" if look.parent < 0 else f"from cell {look.parent:,}")
+            + f", cost {look.cost:.6g}"
+            for look in h.looks
+        ],
+    )
+    yield "estimate", f"{h.estimate:.6g}, raised {_count(len(h.lessons), 'time')}"
+    yield from _listed(
+        "",
+        [
+            f"{_when(lesson.when)}; {lesson.before:.6g} -> {lesson.after:.6g}"
+            for lesson in h.lessons
+        ],
+    )
+    yield "entered", _count(len(h.visits), "time")
+    yield from _listed("", [_when(visit) for visit in h.visits])
+    if h.rejects:
+        yield "rejected", f"motions from it: {_counts(h.rejects)}"
+
+
+def _listed(name: str, lines: list[str]) -> Rows:
+    """Yield the first lines and the last one."""
+    shown = lines if len(lines) <= _SHOWN else lines[: _SHOWN - 1]
+    for i, line in enumerate(shown):
+        yield ("" if i else name), line
+    if len(shown) < len(lines):
+        left = len(lines) - len(shown) - 1
+        yield "", f"... {left:,} more, the last: {lines[-1]}"
+
+
+def _when(when: "When") -> str:
+    return f"event {when.event:,}, iteration {when.iteration:,}, {seconds(when.time_s)}"
+
+
+def _place(q: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in q) + ")"
+
+
+def _count(n: int, one: str, many: str | None = None) -> str:
+    return f"{n:,} {one if n == 1 else many or one + 's'}"
+
+
+def _some(numbers: list[int]) -> str:
+    if not numbers:
+        return ""
+    more = " ..." if len(numbers) > _SHOWN else ""
+    return " (" + ", ".join(f"{n:,}" for n in numbers[:_SHOWN]) + more + ")"
+
+
+def _counts(found: Mapping[str, Any]) -> str:
+    """Say how many there are of each, the most frequent first; of many, those alone."""
+    told = [f"{name} {n:,}" for name, n in list(found.items())[:_SHOWN]]
+    rest = len(found) - len(told)
+    return ", ".join(told) + (f" and {rest:,} others" if rest else "")
+
+
+def _way(lineage: list[int]) -> str:
+    """Write the nodes from the root on; of a long way its ends."""
+    ends = lineage if len(lineage) <= 2 * _SHOWN else lineage[:_SHOWN] + lineage[-_SHOWN:]
+    texts = [f"{node:,}" for node in ends]
+    if len(ends) < len(lineage):
+        texts.insert(_SHOWN, f"... {len(lineage) - len(ends):,} more ...")
+    return f"{_count(len(lineage) - 1, 'edge')}: {' - '.join(texts)}"

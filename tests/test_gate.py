@@ -1,0 +1,213 @@
+"""The gate: exact chances, few false alarms, and files of figures that are read or refused."""
+
+import json
+import math
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import brrt
+from brrt.testing import ranks
+from brrt.testing.figures import Figures
+from brrt.testing.gate import Verdict, gate, judge
+
+NUMBERS = st.one_of(
+    st.floats(-3, 3, allow_subnormal=False), st.sampled_from([-2.0, -1.0, 0.0, 1.0, math.inf])
+)
+VERSIONS = {"brrt": "0.1.0"}
+
+
+def naive_ranks(sizes: list[float]) -> list[float]:
+    """The mean place among all, counted from 1."""
+    return [
+        sum(a < size for a in sizes) + (1 + sum(a == size for a in sizes)) / 2 for size in sizes
+    ]
+
+
+@given(st.lists(NUMBERS, max_size=9))
+def test_signed_rank_counts_all_signs(differences: list[float]) -> None:
+    """The share of all ways to toss the signs with as large a rank sum."""
+    told = [each for each in differences if each]
+    places = naive_ranks([abs(each) for each in told])
+    seen = sum(rank for rank, each in zip(places, told, strict=True) if each > 0)
+    sums = [
+        sum(rank for rank, sign in zip(places, signs, strict=True) if sign)
+        for signs in product((False, True), repeat=len(told))
+    ]
+    expected = sum(each >= seen for each in sums) / len(sums)
+    assert ranks.signed_rank(np.array(differences)) == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.integers(0, 30), st.integers(0, 30))
+def test_sign_test_counts_all_tosses(worse: int, better: int) -> None:
+    """P(at least as many) and P(fewer) make one."""
+    assert ranks.sign_test(worse, better) == pytest.approx(
+        1 - (ranks.sign_test(better + 1, worse - 1) if worse else 0)
+    )
+    assert ranks.sign_test(5, 0) == 1 / 32
+
+
+@given(st.integers(0, 10**6), st.integers(6, 25), st.sampled_from([0.01, 0.05]))
+def test_what_is_proven_is_what_the_test_rejects(seed: int, n: int, alpha: float) -> None:
+    """A margin below what is proven fails, one above passes."""
+    differences = np.random.default_rng(seed).normal(0.3, 1, n)
+    bound = ranks.at_least(differences, alpha)
+    if not math.isfinite(bound):
+        assert 0.5**n > alpha
+        return
+    assert ranks.signed_rank(differences - (bound - 1e-9)) <= alpha
+    assert ranks.signed_rank(differences - (bound + 1e-9)) > alpha
+
+
+def test_log_ratios_at_the_ends() -> None:
+    """Zero and infinity are figures too; two of the same say nothing."""
+    old, new = np.array([0, 0, 1, 1, np.inf, np.inf]), np.array([0, 1, 0, np.inf, 1, np.inf])
+    inf = math.inf
+    assert ranks.log_ratios(old, new).tolist() == [0, inf, -inf, inf, -inf, 0]
+
+
+def made(columns: dict[str, Any]) -> Figures:
+    """Figures at hand; `solved` unless it is said."""
+    n = len(next(iter(columns.values())))
+    columns = {"solved": [True] * n, **columns}
+    runs = {i: {name: values[i] for name, values in columns.items()} for i in range(n)}
+    return Figures(runs, None, VERSIONS)
+
+
+def drawn(rng: np.random.Generator, n: int, scale: float, shared: Any) -> Figures:
+    """A skewed cost, a heavy-tailed count with ties that grows with it, and paths not found."""
+    noise = rng.normal(size=n)
+    return made(
+        {
+            "solved": (rng.random(n) < 0.9).tolist(),
+            "cost": (100 * scale * np.exp(0.1 * noise + shared)).tolist(),
+            "count": (scale * np.ceil(np.exp(rng.normal(2, 1, n) + noise))).tolist(),
+        }
+    )
+
+
+def judged(new: Figures, old: Figures, alpha: float, margin: float) -> Verdict:
+    """Judge both figures of `drawn`."""
+    return judge(new, old, alpha=alpha, name="it", margins={"cost": margin, "count": margin})
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_false_alarms_are_as_rare_as_stated(*, paired: bool) -> None:
+    """Runs that are worse by just the margin fail with the chance alpha, at most.
+
+    `benchmarks/gate.py` does the same with runs of planners, and many more of them.
+    """
+    rng, runs, n, alpha, margin = np.random.default_rng(5), 600, 12, 0.1, 0.25
+    alarms = 0
+    for _ in range(runs):
+        shared = rng.normal(0, 0.5, n) if paired else 0.0
+        old, new = drawn(rng, n, 1.0, shared), drawn(rng, n, 1 + margin, shared)
+        alarms += not judged(new, old, alpha, margin).passed
+    # Beyond four standard deviations of what is allowed once in 30,000 times, were it so.
+    assert alarms <= runs * alpha + 4 * math.sqrt(runs * alpha * (1 - alpha))
+    assert alarms > 0
+
+
+def test_what_is_worse_is_found() -> None:
+    """With 20 seeds, 30 % beyond the margin, or half of the paths gone."""
+    rng = np.random.default_rng(2)
+    old = drawn(rng, 20, 1.0, 0.0)
+    found = judged(drawn(rng, 20, 1.4, 0.0), old, 0.01, 0.02)
+    assert [each.name for each in found.figures if not each.passed] == ["cost"]
+    assert "  cost" in "\n".join(found.lines())
+    lost = made({"solved": [i % 2 == 0 for i in range(20)], "cost": [1.0] * 20})
+    whole = made({"cost": [1.0] * 20})
+    verdict = judge(lost, whole, alpha=0.01, name="it", margins={"cost": 0.5})
+    assert not verdict.figures[0].passed
+    # A cost that is not there is worse than any.
+    assert verdict.figures[1].new == math.inf
+    assert judge(whole, lost, alpha=0.01, name="it", margins={"cost": 0.5}).passed
+
+
+def test_the_same_pass_at_once() -> None:
+    """To the last bit, whatever the margin; and the verdict says so in a line."""
+    scenario = brrt.Scenario(world="circles2d:n=40,seed=3", smooth=False)
+    found = gate(scenario, scenario, seeds=12, cost=0, iterations=0, alpha=0.01)
+    assert found.passed
+    assert found.identical
+    assert found.lines() == ["gate: passed, 12 seeds, each the same to the last bit"]
+    assert all(each.p == 1 for each in found.figures)
+
+
+def test_lines_fit_the_screen_and_json_is_json() -> None:
+    """Also with numbers that are large, zero or missing."""
+    new = made({"solved": [False] * 20, "cost": [1e300] * 20, "rewires": [0] * 20})
+    old = made({"cost": [1e-300] * 20, "rewires": [0] * 20})
+    verdict = judge(new, old, alpha=1e-6, name="it", margins={"cost": 9.99, "rewires": 0})
+    assert all(len(line) <= 80 for line in verdict.lines())
+    assert json.loads(json.dumps(verdict.as_dict(), allow_nan=False))["passed"] is True
+
+
+def test_figures_are_kept(tmp_path: Path) -> None:
+    """Written and read they are the same; a line a seed."""
+    figures = Figures.of(lambda seed: brrt.Run(brrt.Scenario(seed=seed, smooth=False)), [3, 1])
+    path = tmp_path / "new" / "figures.json"
+    figures.save(path)
+    assert Figures.load(path) == figures
+    assert Figures.load(path).holds(figures.of_seeds([1]))
+    assert [line[:6] for line in path.read_text().splitlines() if "iterations" in line] == [
+        '  "3":', '  "1":'
+    ]  # fmt: skip
+    assert figures.runs[3]["cost"] == figures.runs[3]["path_cost"]
+    assert not any(name.endswith("_s") for name in figures.runs[3])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not figures that brrt wrote"),
+        ("[]", "not figures that brrt wrote"),
+        ('{"schema": "else", "version": 1}', r"not brrt\.figures of version 1"),
+        ('{"schema": "brrt.figures", "version": 1, "runs": {"x": {}}}', "not figures that brrt"),
+        (
+            '{"schema": "brrt.figures", "version": 1, "runs": {"7": {"cost": NaN}}}',
+            "7: cost must be a number from 0 on",
+        ),
+        ("[" * 100_000, "not figures that brrt wrote"),
+    ],
+)
+def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    """In one line that names the file."""
+    path = tmp_path / "figures.json"
+    path.write_text(text)
+    with pytest.raises(brrt.BrrtError, match=message) as error:
+        Figures.load(path)
+    assert str(error.value).startswith(str(path))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: gate(brrt.Scenario(), "none.json", cost=0.1), r"none\.json: No such file"),
+        (lambda: gate(brrt.Scenario(time=1.0), brrt.Scenario(), cost=0.1), "a budget of time"),
+        (lambda: gate(None, brrt.Scenario(), cost=0.1), "give a scenario or a function"),  # type: ignore[arg-type]
+        (lambda: gate(lambda seed: seed, brrt.Scenario(), cost=0.1), "seed 0: give a Scenario"),
+        (
+            lambda: gate(made({"a": [1]}), made({"a": [1]}), a=0.1),
+            "the old runs: no figures of seed 1;",
+        ),
+        (lambda: gate(brrt.Scenario(), brrt.Scenario(), seeds=[1] * 20), "must differ"),
+        (lambda: gate(brrt.Scenario(), brrt.Scenario(), cost=-0.1), "margin of cost must be"),
+        (lambda: gate(brrt.Scenario(), brrt.Scenario(), alpha=0, cost=0.1), "alpha must be"),
+        (
+            lambda: gate(brrt.Scenario(), brrt.Scenario(world="maze2d"), seeds=8, cost=0.1),
+            "two problems, not two planners: world 'circles2d' against 'maze2d'",
+        ),
+    ],
+)
+def test_bad_questions_are_refused(call: Callable[[], Verdict], message: str) -> None:
+    """In one line."""
+    with pytest.raises(brrt.BrrtError, match=message):
+        call()
