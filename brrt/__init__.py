@@ -6,6 +6,9 @@ run = brrt.Run(brrt.Scenario(world="circles2d:n=80", seed=7))
 log = brrt.Memory()
 metrics = run.execute([log])
 tree = brrt.forest(log.events())[0]
+
+PYTEST_DONT_REWRITE: whoever imports brrt ahead of pytest is not to be warned, as pytest warns of
+packages that bring a plugin.
 """
 
 from brrt.again import BranchedRun, RepeatedRun
@@ -19,12 +22,14 @@ from brrt.repeat import Again, plan_again
 from brrt.replay.checks import Finding, check
 from brrt.replay.compare import Comparison
 from brrt.replay.diff import Difference, first_difference
+from brrt.replay.explain import Explanation, explain
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
 from brrt.replay.moment import Moment
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
 from brrt.scenario import Manifest, Scenario
+from brrt.testing.gate import Verdict, gate
 from brrt.worlds import GENERATORS, Grid, World, make_world
 
 __all__ = [
@@ -39,6 +44,7 @@ __all__ = [
     "Comparison",
     "Difference",
     "Events",
+    "Explanation",
     "Finding",
     "Grid",
     "Kind",
@@ -59,11 +65,14 @@ __all__ = [
     "Scenario",
     "Sink",
     "Tree",
+    "Verdict",
     "World",
     "check",
     "compare",
+    "explain",
     "first_difference",
     "forest",
+    "gate",
     "make_robot",
     "make_world",
     "plan_again",

@@ -127,7 +127,7 @@ def branching_point(recorded: Recorded, limits: Mapping[str, int]) -> tuple[int,
         BrrtError: Planning had ended before.
     """
     iteration, status = last_whole_iteration(recorded.batches(), limits)
-    if limits.get("iteration", 0) > iteration:
+    if "iteration" in limits and limits["iteration"] > iteration:
         raise BrrtError(
             f"{called(recorded)}: planning ended with iteration {iteration:,}; branch there at the "
             "latest, and what follows planning is made anew"

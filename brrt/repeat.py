@@ -132,6 +132,8 @@ def _run(manifest: Manifest, world: World, end: "_Ending") -> Run:
     if end.attempts is not None:
         manifest = replace(manifest, scenario=replace(manifest.scenario, shortcuts=end.attempts))
     run = RepeatedRun(manifest, world, draws=end.draws)
+    # A run may have been ended ahead of its first draw, which no scenario can say.
+    run.stop.draws = run.stop.draws if end.draws is None else end.draws
     run.stop.time_s = None
     return run
 

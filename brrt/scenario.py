@@ -115,6 +115,8 @@ class Scenario:
         Raises:
             BrrtError: A name is unknown or a value of no use.
         """
+        if not isinstance(values, Mapping):
+            raise BrrtError("a scenario must be a table of names and values")
         names = [f.name for f in fields(cls)]
         for name in values:
             if name not in names:
@@ -280,6 +282,15 @@ class Branch:
     scenario: Scenario
     seed: int | None = None
 
+    def told(self, after: Scenario) -> str:
+        """Say what is otherwise from here on, where another scenario rules."""
+        before, now = ({**s.as_dict(), **s.settings()} for s in (self.scenario, after))
+        names = now.keys() - {"params", "seed", "start", "goal", "draws"}
+        changed = [name for name in sorted(names) if now[name] != before.get(name)]
+        parts = [f"{name} {_said(now[name])}, was {_said(before.get(name))}" for name in changed]
+        parts += [] if self.seed is None else [f"draws from seed {self.seed}"]
+        return "; ".join(parts) or "all as before"
+
     @classmethod
     def parse(cls, values: Mapping[str, Any]) -> Self:
         """Read what `dataclasses.asdict` made of one.
@@ -294,6 +305,13 @@ class Branch:
         if min(known["iteration"], known["events"]) < 0:
             raise ValueError("a branch before the beginning")
         return cls(**known)
+
+
+def _said(value: Any) -> str:
+    """Write a setting; where it is not given, the run decides."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "auto" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """`brrt explain`: why a run failed, or took long."""
 
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated
 
 import typer
@@ -51,5 +52,6 @@ def explain(
     print_pairs((name, text, "") for name, text in found.rows())
     for i, advice in enumerate(found.advice):
         out.print()
-        out.print(f"{i + 1}. {advice.why}", markup=False)
+        why = fill(f"{i + 1}. {advice.why}", 78, subsequent_indent="   ")
+        out.print(why, markup=False)
         out.print(f"   {advice.command}", style="bold", markup=False, soft_wrap=True)

@@ -1,6 +1,5 @@
 """`brrt replay`: a run's figures and trees, from its recording alone."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +13,7 @@ from .saved import Saved
 if TYPE_CHECKING:
     from brrt.events import Instant
     from brrt.recording import Recording
-    from brrt.replay.forest import Tree
+    from brrt.replay.growth import TreeFigures
 
 _VERB = "replay them"
 
@@ -75,8 +74,9 @@ def replay(
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.account import Account  # noqa: PLC0415
+    from brrt.replay.growth import Growth  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
-    from brrt.replay.moment import Structure, feed  # noqa: PLC0415
+    from brrt.replay.moment import feed  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
@@ -94,9 +94,9 @@ def replay(
         _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
         return
     metrics = Metrics(recording.manifest)
-    structure = Structure(recording.manifest.dof)
+    trees = Growth()
     told = Account(recording.manifest, recording.robot()) if text else None
-    folds: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, structure]
+    folds: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
     end = feed(Saved(recording, partial=partial, verb=_VERB), folds, limits)
     if end is not None:
         _note_end(limits, *end)
@@ -111,7 +111,7 @@ def replay(
         raise typer.Exit(Code.FAILED if difference else Code.DONE)
     if told is None:
         print_summary(figures)
-        _show_trees(structure.forest())
+        _show_trees(trees.figures())
     else:
         print_lines(told.lines())
     if golden is not None:
@@ -166,17 +166,17 @@ def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -
     return None if found is None else str(found)
 
 
-def _show_trees(trees: "Mapping[int, Tree]") -> None:
+def _show_trees(trees: "list[TreeFigures]") -> None:
     """Print a line a tree."""
     rows = [
         {
-            "tree": str(number),
-            "nodes": f"{len(tree):,}",
+            "tree": str(tree.tree),
+            "nodes": f"{tree.nodes:,}",
             "leaves": f"{tree.leaves:,}",
             "depth": f"{tree.depth:,}",
-            "greatest cost-to-come": f"{tree.cost.max():.6g}",
+            "greatest cost-to-come": f"{tree.greatest_cost:.6g}",
         }
-        for number, tree in trees.items()
+        for tree in trees
     ]
     if rows:
         out.print()

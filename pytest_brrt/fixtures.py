@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -69,6 +70,19 @@ class _Files:
         return folder / (path.name if ".." in inside.parts else inside)
 
 
+def _headline(found: Comparison) -> str:
+    """Say in a few words what differs; pytest's summary has room for no more."""
+    first = found.first
+    return "other settings" if first is None else f"another run from event {first.seq} on"
+
+
+def _fail(kept: Path, told: str) -> NoReturn:
+    """Fail the test; the message is kept as well, beside what was kept of the run."""
+    __tracebackhide__ = True
+    kept.with_suffix(".txt").write_text(told + "\n", "utf-8")
+    pytest.fail(told, pytrace=False)
+
+
 @contextmanager
 def _failing() -> Iterator[None]:
     """Fail the test by one line where the input is bad."""
@@ -94,8 +108,8 @@ class Golden:
             run: A scenario, or the name of a scenario file; a `Run`, with a planner of your own if
                 you like; a `Recording`, or the name of a recording, by whatever program. Without
                 it the golden run's own scenario is planned anew.
-            tolerance: For each float x of the golden run, an error of tolerance * max(1, abs(x))
-                counts as equal; by default every bit counts. Times never count.
+            tolerance: How far apart numbers may be, relative to the greater, and to 1 where both
+                are less; by default every bit counts. Times never count.
         """
         __tracebackhide__ = True
         with _failing():
@@ -124,8 +138,13 @@ class Golden:
         found = self._compare(path, fresh, tolerance, files.told(kept))
         if not found.equal:
             golden.save(fresh, kept)
-            lines = [*found.lines(), "", f"If that is meant: {_UPDATE}, and commit it."]
-            pytest.fail("\n".join(lines), pytrace=False)
+            lines = [
+                _headline(found),
+                *found.lines(),
+                "",
+                f"If that is meant: {_UPDATE}, and commit it.",
+            ]
+            _fail(kept, "\n".join(lines))
         return fresh
 
     def _renew(self, path: Path, fresh: Recording, tolerance: float) -> None:
@@ -145,15 +164,14 @@ class Golden:
 
     def _compare(self, path: Path, fresh: Recording, tolerance: float, name: str) -> Comparison:
         kept = read(path)
-        near = golden.near(fresh, kept, tolerance)
-        return compare(kept, near, names=(self._files.told(path), name))
+        return compare(kept, fresh, names=(self._files.told(path), name), tolerance=tolerance)
 
 
 class Gate:
     """Holds figures over many seeds against stored ones; see `Gate.__call__`."""
 
     def __init__(self, request: pytest.FixtureRequest) -> None:
-        self._files, self._stored = _Files(request), False
+        self._files = _Files(request)
 
     def __call__(
         self,
@@ -184,24 +202,30 @@ class Gate:
             check_question(numbers, alpha, margins)
             if isinstance(against, str):
                 path = self._files.path(against, ".json")
-                verdict = self._against(path, Figures.of(run, numbers), judged)
-            else:
-                verdict = judged(run, against, "gate")
+                return self._against(path, Figures.of(run, numbers), judged)
+            verdict = judged(run, against, "gate")
         if not verdict.passed:
-            meant = f"If that is meant: {_UPDATE}, and commit it." if self._stored else ""
-            pytest.fail("\n".join([*verdict.lines(), meant]).rstrip(), pytrace=False)
+            pytest.fail("\n".join(verdict.lines()), pytrace=False)
         return verdict
 
     def _against(self, path: Path, new: Figures, judged: Callable[..., Verdict]) -> Verdict:
         """Judge figures against stored ones, after these were renewed if that is what is wanted."""
-        self._stored, told = True, self._files.told(path)
+        __tracebackhide__ = True
+        told = self._files.told(path)
         if self._files.update:
             same = judged(new, new, told)
             self._renew(path, new, judged)
             return same
         if not path.exists():
             raise BrrtError(f"no golden figures {told}; make them: {_UPDATE}, and commit them")
-        return judged(new, path, told)
+        verdict = judged(new, path, told)
+        if not verdict.passed:
+            kept = self._files.failed(path)
+            new.save(kept)
+            _fail(
+                kept, "\n".join([*verdict.lines(), f"If that is meant: {_UPDATE}, and commit it."])
+            )
+        return verdict
 
     def _renew(self, path: Path, new: Figures, judged: Callable[..., Verdict]) -> None:
         told = self._files.told(path)

@@ -27,7 +27,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--brrt-failed",
         metavar="DIR",
-        help="Keep runs that differ from their golden ones here (default: in pytest's cache).",
+        help="Keep runs and figures that failed here, with what was told of them "
+        "(default: in pytest's cache).",
     )
     group.addoption(
         "--brrt-unused",

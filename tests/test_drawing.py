@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from brrt import Events, Kind, McapSink, Memory, Run, Scenario, Sink, forest, read
 from brrt.events import Reason, Table, table_dtype
-from brrt.recording import pages, paths, rerun, scene, sketch
+from brrt.recording import landscape, pages, paths, rerun, scene, sketch
 from brrt.recording.rerun import RerunSink
 
 SQUARES = "squares2d:n=30,seed=3"
@@ -244,9 +246,60 @@ def test_moves(tmp_path: Path) -> None:
     again = moves["step"] == 1
     assert np.array_equal(lines[again, 0], [start, start])
     assert np.array_equal(lines[1:, 0][~again[1:]], lines[:-1, 1][~again[1:]])
-    places = rows(path, "/world/robot", ":positions")
-    assert [at for at, _ in places] == moves["seq"].tolist()
-    assert np.array_equal([place for _, (place,) in places], moves["q"].astype(np.float32))
+    halves = rows(path, scene.CELL_ENTITY, ":half_sizes")
+    assert [half for _, (half,) in halves] == [[1.0, 1.0]] * len(moves)
+    for entity, name in (
+        ("/world/robot", ":positions"), (scene.TAIL_ENTITY, ":positions"),
+        (scene.CELL_ENTITY, ":centers"),
+    ):  # fmt: skip
+        places = rows(path, entity, name)
+        assert [at for at, _ in places] == moves["seq"].tolist()
+        assert np.array_equal([place for _, (place,) in places], moves["q"].astype(np.float32))
+
+
+def test_search_in_space(tmp_path: Path) -> None:
+    """One can look through what was searched: there is a cell in each part of it, and no more."""
+    path, world = tmp_path / "run.rrd", "boxes3d:size=30,n=5,min_side=2,max_side=4,seed=2"
+    log = record(path, Scenario(planner="a-star", world=world, params={"epsilon": 0.75}))
+    dots = np.array([dot for _, row in rows(path, scene.CELLS_ENTITY, ":positions") for dot in row])
+    cells = log[Kind.EXPAND]["q"]
+
+    def parts(places: NDArray[Any]) -> list[tuple[int, ...]]:
+        steps = (places.astype("f4") * (20 / np.full(3, 30.0))).astype(int)
+        return list(map(tuple, np.minimum(steps, 19).tolist()))
+
+    assert len(set(parts(dots))) == len(dots) < len(cells) / 3
+    assert set(parts(dots)) == set(parts(cells))
+    assert {tuple(dot) for dot in dots} <= {tuple(q) for q in cells.astype("f4").tolist()}
+    assert not rows(path, scene.SEARCH_ENTITY, ":strips")
+
+
+sides = st.floats(1e-3, 1e3)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.tuples(sides, sides), min_size=1, max_size=4), st.integers(0, 99))
+def test_boxes_are_filled(sizes: list[tuple[float, float]], seed: int) -> None:
+    """Thick lines cover all of a box, whatever its shape, and nothing outside."""
+    upper = np.array(sizes)
+    fill = landscape._filled_boxes(0 * upper, upper)
+    centres, halves, radii = (
+        np.array(part.as_arrow_array().to_pylist())  # type: ignore[union-attr]
+        for part in (fill.centers, fill.half_sizes, fill.radii)
+    )
+    assert (halves > 0).all()  # Rerun draws nothing else
+    rng = np.random.default_rng(seed)
+    for corner in upper:
+        mine = (np.abs(centres - corner / 2) < 1e-6 * corner).all(axis=1) & (radii > 0)
+        points = corner * np.concatenate([rng.random((200, 2)), [[0.5, 0.5]]])
+        away = np.abs(points[:, None] - corner / 2) - halves[mine]
+        # The distance to a rectangle's outline, from outside and from inside.
+        far = np.where(
+            (away > 0).any(axis=-1), np.hypot(*np.maximum(away, 0).T).T, -away.max(axis=-1)
+        )
+        assert (far < radii[mine]).any(axis=1).mean() > 0.97  # not the round corners
+        assert (far[-1] < radii[mine]).any()
+        assert (halves[mine] + radii[mine, None] < 1.000001 * corner / 2).all()
 
 
 def test_body(tmp_path: Path) -> None:

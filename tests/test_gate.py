@@ -121,13 +121,20 @@ def test_what_is_worse_is_found() -> None:
     found = judged(drawn(rng, 20, 1.4, 0.0), old, 0.01, 0.02)
     assert [each.name for each in found.figures if not each.passed] == ["cost"]
     assert "  cost" in "\n".join(found.lines())
-    lost = made({"solved": [i % 2 == 0 for i in range(20)], "cost": [1.0] * 20})
+    lost = made({"solved": [i % 2 == 0 for i in range(20)], "cost": [9.0] * 20})
     whole = made({"cost": [1.0] * 20})
     verdict = judge(lost, whole, alpha=0.01, name="it", margins={"cost": 0.5})
-    assert not verdict.figures[0].passed
-    # A cost that is not there is worse than any.
-    assert verdict.figures[1].new == math.inf
+    assert not any(each.passed for each in verdict.figures)
     assert judge(whole, lost, alpha=0.01, name="it", margins={"cost": 0.5}).passed
+    # A cost of a run without a path is none: it hides nothing that the others prove.
+    half = made(
+        {"solved": [i % 2 == 0 for i in range(20)], "cost": [1.0 + i % 2 for i in range(20)]}
+    )
+    verdict = judge(lost, half, alpha=0.01, name="it", margins={"cost": 0.5})
+    assert [each.passed for each in verdict.figures] == [True, False]
+    verdict = judge(NONE, whole, alpha=0.01, name="it", margins={"cost": 0.5})
+    assert [each.passed for each in verdict.figures] == [False, True]
+    assert "no path" in "\n".join(verdict.lines())
 
 
 def test_the_same_pass_at_once() -> None:
@@ -142,11 +149,11 @@ def test_the_same_pass_at_once() -> None:
 
 def test_lines_fit_the_screen_and_json_is_json() -> None:
     """Also with numbers that are large, zero or missing."""
-    new = made({"solved": [False] * 20, "cost": [1e300] * 20, "rewires": [0] * 20})
+    new = made({"solved": [i > 3 for i in range(20)], "cost": [1e300] * 20, "rewires": [0] * 20})
     old = made({"cost": [1e-300] * 20, "rewires": [0] * 20})
-    verdict = judge(new, old, alpha=1e-6, name="it", margins={"cost": 9.99, "rewires": 0})
+    verdict = judge(new, old, alpha=1e-3, name="it", margins={"cost": 9.99, "rewires": 0})
     assert all(len(line) <= 80 for line in verdict.lines())
-    assert json.loads(json.dumps(verdict.as_dict(), allow_nan=False))["passed"] is True
+    assert json.loads(json.dumps(verdict.as_dict(), allow_nan=False))["passed"] is False
 
 
 def test_figures_are_kept(tmp_path: Path) -> None:
@@ -187,6 +194,9 @@ def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> Non
     assert "\n" not in str(error.value)
 
 
+WHOLE, NONE = made({"cost": [1.0] * 20}), made({"solved": [False] * 20})
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -197,6 +207,14 @@ def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> Non
         (
             lambda: gate(made({"a": [1]}), made({"a": [1]}), a=0.1),
             "the old runs: no figures of seed 1;",
+        ),
+        (
+            lambda: judge(WHOLE, NONE, alpha=0.01, name="it", margins={"cost": 0.5}),
+            "the old runs found 0 paths, and it takes 8 to prove anything of cost; give more",
+        ),
+        (
+            lambda: judge(WHOLE, WHOLE, alpha=0.01, name="it", margins={"cots": 0.5}),
+            "unknown figure 'cots'; did you mean 'cost'",
         ),
         (lambda: gate(brrt.Scenario(), brrt.Scenario(), seeds=[1] * 20), "must differ"),
         (lambda: gate(brrt.Scenario(), brrt.Scenario(), cost=-0.1), "margin of cost must be"),

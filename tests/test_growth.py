@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrt import Events, Kind, RecordingError, Scenario, forest
+from brrt.replay.forest import depth_of
 from brrt.replay.growth import Growth, TreeFigures
 
 from .conftest import recorded
@@ -41,6 +42,24 @@ def test_figures_are_the_forests(scenario: Scenario, data: st.DataObject) -> Non
         tree = trees[figures.tree]
         assert figures[1:4] == (len(tree), tree.leaves, tree.depth)
         assert figures.greatest_cost == pytest.approx(tree.cost.max(), rel=1e-12)
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**32), n=st.integers(1, 30_000), near=st.sampled_from([1, 40, 10**6]))
+def test_depth_of_trees_larger_than_a_block(seed: int, n: int, near: int) -> None:
+    """Depth against one node after another; the order of the nodes does not matter."""
+    rng = np.random.default_rng(seed)
+    back = rng.integers(1, near + 1, n)
+    parent = np.maximum(np.arange(n) - back, 0)
+    parent[0] = -1
+    depths = [0] * n
+    for node, above in enumerate(parent.tolist()):
+        depths[node] = depths[above] + 1 if node else 0
+    assert depth_of(parent) == max(depths)
+    names = rng.permutation(n)
+    shuffled = np.empty(n, np.int64)
+    shuffled[names] = np.where(parent < 0, -1, names[parent])
+    assert depth_of(shuffled) == max(depths)
 
 
 def test_wrong_trees_are_refused() -> None:

@@ -527,6 +527,24 @@ def test_the_last_frame_is_the_picture(name: str, tmp_path: Path) -> None:
     assert np.array_equal(whole[-1], last)
 
 
+@pytest.mark.parametrize("name", ["squares2d-bi-rrt-coin", "boxes3d-lrta-star"])
+def test_every_frame_has_the_legend(name: str, tmp_path: Path) -> None:
+    """What comes late is named from the first frame on, in its colour, and nothing else changes."""
+    save_animation(record(name), tmp_path / "x.gif", Look(dpi=100), Pace(0.5, 10))
+    frames = np.array(frames_of(tmp_path / "x.gif")[0])
+    below = frames[:, -30:]
+    assert (below == below[0]).all()
+    trees = [style.tree_style(number)[1] for number in (0, 1)] if "rrt" in name else [style.ROBOT]
+    for colour in (*trees, style.START, style.GOAL, style.SMOOTHED):
+        far = np.abs(below[0] - 255 * np.array(colour)).max(axis=-1)
+        assert (far < 12).sum() >= 8, colour
+    if "lrta" in name:
+        heat = 255 * colormaps[style.HEAT](np.linspace(0, 1, 9))[:, None, :3]
+        scale = frames[0, -90:-30].reshape(-1, 3)
+        faint = 255 - (255 - heat) * 0.75
+        assert (np.abs(scale - faint).max(axis=-1).min(axis=1) < 12).all()
+
+
 @given(seconds=st.floats(0.5, 20), fps=st.floats(1, 60))
 def test_frames_go_from_the_first_event_to_the_last(seconds: float, fps: float) -> None:
     """None goes back, the first come slowly, and together they last as long as they should."""

@@ -1,16 +1,21 @@
 """Golden runs and gates in somebody else's test suite."""
 
+import importlib
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+import yaml
 
 import brrt
 from brrt.testing import golden
+from brrt.testing.figures import Figures
 
 SCENARIO = 'brrt.Scenario(world="circles2d:n=40,seed=3", seed={})'
 ONE = f"""
@@ -19,7 +24,14 @@ import brrt
 def test_forest(brrt_golden):
     brrt_golden("forest", {SCENARIO.format(7)})
 """
+ROOT = Path(__file__).parents[1]
 Pytest = Callable[..., pytest.RunResult]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _numba() -> None:
+    """Let numba load all of itself; what is first imported in a session in process is unloaded."""
+    brrt.Run(brrt.Scenario(world="circles2d:n=40,seed=3")).execute()
 
 
 @pytest.fixture
@@ -82,6 +94,8 @@ def test_made_held_changed_and_renewed(pytester: pytest.Pytester, run: Pytest) -
     expected = brrt.compare(kept, fresh, names=("golden/forest.mcap", "failed/golden/forest.mcap"))
     assert "\n".join(expected.lines()) in text(changed)
     assert "They part at event 2" in text(changed)
+    told = fresh.with_suffix(".txt").read_text()
+    assert told.rstrip("\n") in text(changed)
     assert kept.read_bytes() == first
     renewed = run("--brrt-update")
     assert renewed.ret == 1
@@ -202,11 +216,16 @@ def test_gate_made_held_changed_and_renewed(pytester: pytest.Pytester, run: Pyte
     assert list(json.loads(kept.read_text())["runs"]) == list(map(str, range(12)))
     worse = GATE.replace("gate(OLD", "gate(replace(OLD, params={'step': 1.0})")
     file.write_text(worse.replace("    assert verdict.identical\n", ""))
-    failed = run()
+    failed = run("--brrt-failed=failed")
     assert failed.ret == 1
     assert "golden/figures.json: FAILED, 12 seeds" in text(failed)
     assert any(line.startswith("  iterations") and "FAIL" in line for line in failed.outlines)
+    assert (pytester.path / "failed" / "golden" / "figures.txt").read_text().rstrip() in text(
+        failed
+    )
+    fresh = Figures.load(pytester.path / "failed" / "golden" / "figures.json")
     renewed = run("--brrt-update")
+    assert Figures.load(kept) == fresh
     assert summary(renewed) == ["golden/figures.json: renewed; by the old ones: FAILED, 12 seeds"]
     assert run().ret == 0
 
@@ -426,6 +445,15 @@ def test_update_is_refused_in_ci_and_settings_are_checked(
     assert "brrt_unused must be report or fail, not 'maybe'" in text(wrong)
 
 
+@pytest.mark.parametrize("name", ["brrt", "brrt_cli", "pytest_brrt"])
+def test_no_warning_where_it_was_imported_ahead_of_pytest(name: str) -> None:
+    """Of all that a wheel with a plugin installs, pytest wants to rewrite the assertions.
+
+    Where it is too late for that, as in a notebook, it warns, but not of packages with this mark.
+    """
+    assert "PYTEST_DONT_REWRITE" in (importlib.import_module(name).__doc__ or "")
+
+
 QUIET = """
 import sys
 
@@ -451,3 +479,54 @@ def test_costs_nothing_and_disturbs_nobody(pytester: pytest.Pytester, run: Pytes
     assert done.stdout.splitlines()[0].split() == [".", "[100%]"]
     assert len(done.stdout.splitlines()) == 2
     assert not done.stderr
+
+
+def test_the_example_of_the_readme(pytester: pytest.Pytester, run: Pytest) -> None:
+    """It makes the two files that the text names, and passes."""
+    readme = (ROOT / "README.md").read_text()
+    found = re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
+    (code,) = (block for block in found if "def test_" in block)
+    pytester.makepyfile(test_readme=code)
+    update(run)
+    names = sorted(path.name for path in (pytester.path / "golden").iterdir())
+    assert names == ["forest.json", "forest.mcap"]
+    assert run("--brrt-unused=fail").ret == 0
+
+
+def test_the_recipe_for_ci(
+    pytester: pytest.Pytester, run: Pytest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is YAML of the form that a workflow has, and its commands do what the page says."""
+    page = (ROOT / "docs" / "ci.md").read_text()
+    (block,) = re.findall(r"^```yaml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    workflow = yaml.safe_load(block)
+    (job,) = workflow["jobs"].values()
+    steps = {
+        step.get("name", step.get("uses", "").partition("@")[0]): step for step in job["steps"]
+    }
+    assert all("@v" in step["uses"] for step in job["steps"] if "uses" in step)
+    assert steps["actions/cache"]["with"]["path"] == job["env"]["BRRT_CACHE_DIR"].rpartition("/")[2]
+    assert steps["actions/upload-artifact"]["with"]["path"] == "failed"
+    bash = shutil.which("bash")
+    assert bash is not None
+    for step in job["steps"]:
+        subprocess.run([bash, "-n", "-c", step.get("run", "")], check=True)
+    file = pytester.makepyfile(test_a=ONE)
+    update(run)
+    file.write_text(ONE.replace("seed=7", "seed=8"))
+    assert run(*steps["Test"]["run"].split()[1:]).ret == 1
+    # As a runner does it, with the command of this environment on the path.
+    command = pytester.mkdir("bin") / "brrt"
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m brrt_cli "$@"\n')
+    command.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{command.parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(pytester.path / "summary.md"))
+    subprocess.run([bash, "-e", "-c", steps["Say what changed"]["run"]], check=True)
+    failed = pytester.path / "failed"
+    told = (pytester.path / "summary.md").read_text()
+    assert told == (failed / "report.md").read_text()
+    headline = "another run from event 2 on"
+    assert told.startswith(f"### golden/forest\n```\n{headline}\nA  golden/forest.mcap\n")
+    assert "They part at event 2" in told
+    assert brrt.read(failed / "golden" / "forest.rrd").manifest.scenario.seed == 8
+    assert "failed/report.md" in steps["Comment"]["run"]

@@ -17,7 +17,7 @@ from brrt.colours import OBSTACLE, OBSTACLE_3D
 from brrt.errors import BrrtError
 from brrt.files import replacing
 from brrt.pictures import style
-from brrt.pictures.figure import Look, height_of_tree, tree_panel
+from brrt.pictures.figure import Look, explain, height_of_tree, tree_panel
 from brrt.pictures.history import History, Record
 from brrt.pictures.tree import TreePanel
 from brrt.worlds.picture import need_matplotlib, rgb
@@ -128,7 +128,7 @@ def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     width = look.width or style.COLUMN_IN + 0.01
-    size = width, height_of_tree(record, width, legend=False)
+    size = width, height_of_tree(record, width)
     if max(size) * look.dpi > _MOST_PIXELS:
         raise BrrtError(
             f"{max(size) * look.dpi:.0f} pixels are too many for an animation, which has at most "
@@ -137,13 +137,22 @@ def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
     figure = Figure(figsize=size, dpi=look.dpi, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)
     panel = tree_panel(figure, record, look)
-    panel.caption.set_text("room for the caption")
+    explain(figure, panel, _marks(panel))
     canvas.draw()
     figure.set_layout_engine("none")
     for artist in panel.drawn_last:
         artist.set_animated(True)
     canvas.draw()
     return panel, canvas
+
+
+def _marks(panel: TreePanel) -> list[Any]:
+    """Return what a legend has to name of all that comes; a robot has arrived at the end."""
+    marks: list[Any] = []
+    for seq in (panel.history.planned, panel.history.last):
+        panel.show(seq)
+        marks += [mark for mark in panel.legend() if mark not in marks]
+    return marks
 
 
 def _frames(
@@ -202,7 +211,8 @@ def _palette() -> Pixels:
     full = np.array([*trees, *others])[:, None]
     faint = 1 - (1 - full) * np.array([1.0, 0.75, 0.5, 0.25])[:, None]
     heat = colormaps[style.HEAT](np.linspace(0, 1, 48))[:, :3]
-    colours = np.concatenate([[[1, 1, 1]], faint.reshape(-1, 3), heat])
+    in_space = 1 - (1 - heat) * style.CELL_ALPHA
+    colours = np.concatenate([[[1, 1, 1]], faint.reshape(-1, 3), heat, in_space])
     return np.unique((255 * colours).round().astype(np.uint8), axis=0)
 
 

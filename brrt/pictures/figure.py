@@ -118,11 +118,9 @@ def tree_panel(part: Any, record: Record, look: Look) -> TreePanel:
     return TreePanel(record, ax, look.rejects)
 
 
-def height_of_tree(record: Record, width: float, *, legend: bool = True) -> float:
-    """Return the height, in inches, that suits the world in a width."""
-    below = 0.0
-    if legend:
-        below = _LEGEND_HEIGHT + _SCALE_HEIGHT * bool(record.events.counts.get(Kind.EXPAND))
+def height_of_tree(record: Record, width: float) -> float:
+    """Return the height, in inches, that suits the world, its legend and scale in a width."""
+    below = _LEGEND_HEIGHT + _SCALE_HEIGHT * bool(record.events.counts.get(Kind.EXPAND))
     if record.manifest.dim == 3:
         return 0.85 * width + below
     size = record.world.upper - record.world.lower
@@ -133,7 +131,17 @@ def height_of_tree(record: Record, width: float, *, legend: bool = True) -> floa
 def _add_tree(part: Any, record: Record, look: Look) -> None:
     panel = tree_panel(part, record, look)
     panel.show(panel.history.last)
-    marks = panel.legend()
+    explain(part, panel, panel.legend())
+
+
+def explain(part: Any, panel: TreePanel, marks: Sequence[Any]) -> None:
+    """Say below a tree what is what.
+
+    Args:
+        part: The figure.
+        panel: The tree in it.
+        marks: What has a name, see `TreePanel.legend`.
+    """
     rows = -(-len(marks) // _LEGEND_COLUMNS)
     columns = -(-len(marks) // rows)
     legend = part.legend(

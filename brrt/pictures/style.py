@@ -20,6 +20,8 @@ QUIET = rgb((96, 103, 118))
 """Type and ticks that explain."""
 HEAT = "viridis"
 """Map of colours from cheap to dear, even to the colour-blind eye and in grey."""
+CELL_ALPHA = 0.75
+"""Of cells in 3D, where one looks through them."""
 
 _TREES: Mapping[int, tuple[str, Colour, Colour]] = {
     0: ("start", (38, 104, 214), (0, 158, 190)),

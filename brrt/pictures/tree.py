@@ -193,7 +193,7 @@ class TreePanel:
         else:
             size = 90 * self._edge / self._record.world.extent
             marks = self._ax.scatter(
-                [], [], [], c=[], s=size**2, marker="o", linewidths=0, alpha=0.75,
+                [], [], [], c=[], s=size**2, marker="o", linewidths=0, alpha=style.CELL_ALPHA,
                 depthshade=False, **look,
             )  # fmt: skip
         marks.set_rasterized(len(values) > MOST_VECTORS)

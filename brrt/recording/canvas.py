@@ -36,6 +36,7 @@ class Canvas:
         flat = scene.is_flat(manifest)
         self.lines: Any = rr.LineStrips2D if flat else rr.LineStrips3D
         self.points: Any = rr.Points2D if flat else rr.Points3D
+        self.boxes: Any = rr.Boxes2D if flat else rr.Boxes3D
         self._rec = rec
         self._styles: dict[str, list[Any]] = {}
         self._news: list[tuple[Any, str]] = []

@@ -9,14 +9,22 @@ from brrt.events import Events, Kind, Table
 from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows, merged
 from brrt.recording.pages import Pages
-from brrt.recording.sketch import DRAWN_IN_FULL, Sketch
+from brrt.recording.sketch import Sketch, Thinning
 from brrt.scenario import Manifest
 
 _IN_PLANE, _IN_SPACE = 0.42, 0.16
 """Radius of a cell's dot in edges of a cell; small in 3D, where one has to look through."""
 
+_SMALLEST, _DOT = 0.0025, {2: -3.0, 3: -2.25}
+"""A dot's least radius as a part of the world's extent; what stands for less, by the world's
+dimensions, in points of the screen: a cell of a fine lattice would not be seen at all."""
+
 _WAY = 0.06
-"""Radius of the line between two cells, likewise."""
+"""Radius of the line between two cells, in edges of a cell."""
+
+_SEARCHED, _LEARNT = (0, 20**3), (20_000, 20**3)
+"""In 3D, where cells hide each other: how many are drawn in full, and then parts of the world with
+a cell each. A search without a robot fills the space that it looks through."""
 
 
 class Cells:
@@ -35,10 +43,13 @@ class Cells:
         self._canvas, self._sketches = canvas, sketches
         settings = manifest.scenario.settings()
         self._edge, self._learns = float(settings.get("epsilon", 0.0)), "lookahead" in settings
-        self._radius = self._edge * (_IN_PLANE if canvas.dim == 2 else _IN_SPACE)
+        radius = self._edge * (_IN_PLANE if canvas.dim == 2 else _IN_SPACE)
+        fine = radius < _SMALLEST * canvas.world.extent
+        self._radius = _DOT[canvas.dim] if fine else radius
         self._goal = np.array(manifest.goal)
         self._scale = float(canvas.robot.distance(np.array(manifest.start), self._goal)) or 1.0
-        self._cells = Sketch(canvas.world)
+        limits = () if canvas.dim == 2 else _LEARNT if self._learns else _SEARCHED
+        self._cells = Sketch(canvas.world, Thinning(canvas.world, *limits))
         self._raises = 0
         self._item = np.dtype([("place", "<f4", (canvas.dim,)), ("colour", "<u4")])
         self._pages = Pages(
@@ -66,7 +77,7 @@ class Cells:
         self._canvas.plot_style("/series/nodes/cells", "expanded cells", scene.TRACE)
         if self._learns:
             self._canvas.plot_style("/series/nodes/raises", "heuristic raises", scene.OTHER)
-        else:
+        elif self._canvas.dim == 2:
             thin, colour = self._edge * _WAY, scene.tree_style(0)[1]
             self._canvas.style(scene.SEARCH_ENTITY, self._canvas.lines, colour, thin, 20.0)
 
@@ -83,6 +94,8 @@ class Cells:
         items = self._items(canvas.places(drawn["q"]), drawn["cost"])
         counts, style = np.diff(ends, prepend=0), self._style(len(ends))
         canvas.send_rows(scene.CELLS_ENTITY, drawn[ends - 1], counts, self._dots(items), style)
+        if canvas.dim > 2:
+            return  # from where one came that is not drawn
         ways = [cells.places(drawn["parent"]), items["place"]]
         lines = np.stack(ways, axis=1).reshape(-1, canvas.dim)
         canvas.send(scene.SEARCH_ENTITY, drawn, ends, canvas.strips(lines, 2))
@@ -120,8 +133,8 @@ class Cells:
             ends = growing_rows(before, len(new))
             canvas.plot("/series/nodes/cells", new[ends - 1], before + ends)
             if cells.thinning.begins_within(len(new)):
-                limit = f"beyond {DRAWN_IN_FULL:,} only cells in new places are drawn"
-                canvas.tell(new[-1], f"cells: {limit}")
+                beyond = f"beyond {cells.thinning.full:,} " if cells.thinning.full else ""
+                canvas.tell(new[-1], f"cells: {beyond}only those in new places are drawn")
             kept = np.flatnonzero(first)[drawn]
             first[:] = False
             first[kept] = True

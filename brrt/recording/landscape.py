@@ -170,9 +170,10 @@ def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:
 def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.Boxes2D:
     """Boxes of thick lines nested in each other, and an edge: Rerun fills no shapes in 2D."""
     centre, half = (lower + upper) / 2, (upper - lower) / 2
-    radius = half.min(axis=1) / (1 + _OVERLAP * (_LAYERS - 1))
+    # The innermost box is no point: Rerun draws no line that goes nowhere.
+    radius = half.min(axis=1) / (1.25 + _OVERLAP * (_LAYERS - 1))
     inset = (1 + _OVERLAP * np.arange(_LAYERS)[:, None]) * radius
-    nested = np.maximum(half - inset[..., None], 0).reshape(-1, 2)
+    nested = (half - inset[..., None]).reshape(-1, 2)
     return rr.Boxes2D(
         centers=np.tile(centre, (_LAYERS + 1, 1)),
         half_sizes=np.concatenate([nested, half]),

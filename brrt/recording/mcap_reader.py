@@ -1,13 +1,10 @@
 """Events out of MCAP: record by record from the front, so that a cut file gives what it has."""
 
-import json
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from io import BytesIO
-from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,8 +17,8 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, table_dtype
 from brrt.recording.cdr import MESSAGE, RECORD_HEAD, Layout
-from brrt.recording.container import MAGIC
-from brrt.recording.mcap_records import FOOTER, opened, parsed, records_of
+from brrt.recording.mcap_end import LABELS, ending, figures_of
+from brrt.recording.mcap_records import opened, parsed, records_of
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
 from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head
@@ -30,14 +27,14 @@ from brrt.scenario import Manifest
 _ANY, _TIMES = 1 << 20, 256
 """Of what a chunk unpacks to: bytes in any case, and times its size; events come to 15 times."""
 
-_MOST_DECLARED, _MOST_SCHEMA = 1000, 1 << 20
-"""Schemas and channels in a chunk, and bytes of a schema."""
+_DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+_MOST_DECLARED, _MOST_SCHEMA = 100_000, 1 << 20
+"""Schemas and channels in a file, which other tools repeat in each chunk; bytes of a schema."""
 
 _MOST_SEARCHED = 4_000_000
 """Messages that are searched for in chunks without an index: a second or two."""
 
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
-_LABELS = {f"/brrt/{kind.label}": kind for kind in Kind}
 
 
 def read_mcap(path: Path) -> Recording:
@@ -59,7 +56,8 @@ def read_mcap(path: Path) -> Recording:
                 if attachment.name == WORLD:
                     manifest, world = head(path, texts, attachment.data)
                     batches = partial(_batches, path, manifest)
-                    return Recording(manifest, world, batches, _result(path))
+                    result, counts = ending(path)
+                    return Recording(manifest, world, batches, result, counts)
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
     raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
@@ -70,36 +68,6 @@ def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
         yield from records_of(path, file, check_end=False)
     except CutError as error:
         raise CutError(f"{error}, ahead of the first event: there is nothing to save") from None
-
-
-def _result(path: Path) -> Mapping[str, Any] | None:
-    """Look up the figures at the end of the file; None where it has no whole end."""
-    with path.open("rb") as file:
-        try:
-            size = file.seek(-FOOTER - len(MAGIC), SEEK_END)
-            summary = parsed(path, records.Footer, file.read(FOOTER)[9:]).summary_start
-            if not 0 < size - summary <= MOST_BYTES:
-                return None
-            file.seek(summary)
-            for opcode, data in records_of(
-                path, BytesIO(file.read(size - summary)), check_end=False
-            ):
-                if opcode == Opcode.METADATA_INDEX:
-                    index = parsed(path, records.MetadataIndex, data)
-                    if index.name == RESULT and index.length <= MOST_BYTES:
-                        file.seek(index.offset)
-                        return _figures(path, file.read(index.length)[9:])
-        except (OSError, OverflowError, RecordingError):
-            return None  # a cut file fails in many ways; its events are still good
-    return None
-
-
-def _figures(path: Path, data: bytes) -> Mapping[str, Any]:
-    texts = parsed(path, records.Metadata, data).metadata
-    try:
-        return {name: json.loads(text) for name, text in texts.items()}
-    except (ValueError, RecursionError):
-        raise RecordingError(f"{path}: damaged: the figures are not JSON") from None
 
 
 @dataclass(slots=True)
@@ -116,6 +84,7 @@ class _Decoder:
     manifest: Manifest
     numbering: Numbering = field(default_factory=Numbering)
     searched: int = 0
+    declared: int = 0
     schemas: dict[int, str] = field(default_factory=dict)
     channels: dict[int, _Channel] = field(default_factory=dict)
 
@@ -156,29 +125,32 @@ class _Decoder:
 
     def learn(self, raw: bytes) -> int:
         """Take in the schemas and channels that a chunk begins with; return where they end."""
-        at = declared = 0
-        while at + 9 <= len(raw) and raw[at] in (Opcode.SCHEMA, Opcode.CHANNEL):
-            length = struct.unpack_from("<Q", raw, at + 1)[0]
-            declared += 1
-            if declared > _MOST_DECLARED or length > _MOST_SCHEMA:
-                raise self.damaged("a chunk declares more than any real one")
-            self._declare(raw[at], raw[at + 9 : at + 9 + length])
-            at += 9 + length
+        at = 0
+        while at + 9 <= len(raw) and raw[at] in _DECLARATIONS:
+            at = self._declare(raw, at)
         return at
 
-    def _declare(self, opcode: int, data: bytes) -> None:
+    def _declare(self, raw: bytes, at: int) -> int:
+        """Take in a schema or a channel; return where it ends."""
+        opcode, length = struct.unpack_from("<BQ", raw, at)
+        end: int = at + 9 + length
+        self.declared += 1
+        if self.declared > _MOST_DECLARED or length > _MOST_SCHEMA:
+            raise self.damaged("it declares more than any real file")
+        data = raw[at + 9 : end]
         if opcode == Opcode.SCHEMA:
             schema = parsed(self.path, records.Schema, data)
             self.schemas[schema.id] = schema.data.decode(errors="replace")
-            return
+            return end
         channel = parsed(self.path, records.Channel, data)
-        if channel.topic not in _LABELS or channel.schema_id not in self.schemas:
-            return
+        if channel.topic not in LABELS or channel.schema_id not in self.schemas:
+            return end
         try:
             layout = Layout.parse(self.schemas[channel.schema_id])
         except (BrrtError, ValueError) as error:
             raise self.damaged(f"the schema of {channel.topic}: {error}") from None
-        self.channels[channel.id] = _Channel(_LABELS[channel.topic], layout)
+        self.channels[channel.id] = _Channel(LABELS[channel.topic], layout)
+        return end
 
     def events(self, chunk: bytes, index: Mapping[int, NDArray[np.uint64]]) -> Events:
         """Decode the messages of a chunk.
@@ -192,28 +164,30 @@ class _Decoder:
         """
         raw = self.unpack(chunk)
         begin = self.learn(raw)
-        tables, known = {}, begin
-        for number, offsets in index.items():
-            channel = self.channels.get(number)
-            if channel is not None and len(offsets):
-                if channel.kind in tables:
-                    raise self.damaged(f"two channels hold events of kind {channel.kind.label}")
-                tables[channel.kind] = self._table(raw, number, channel, offsets)
-                known += self._sizes(raw, channel, offsets)
-        if known < len(raw):
-            # A file that was cut between a chunk and its indexes, or written anew without them.
-            index = self._found(raw, begin)
-            tables = {
-                channel.kind: self._table(raw, number, channel, offsets)
-                for number, offsets in index.items()
-                if (channel := self.channels.get(number)) is not None
-            }
+        tables, size = self._tables(raw, index)
+        if begin + size < len(raw):
+            # A file that was cut between a chunk and its indexes, or written anew by other tools.
+            tables, _ = self._tables(raw, self._found(raw, begin))
         events = Events(self.manifest.dof, dict(sorted(tables.items())))
         try:
             self.numbering.take(events)
         except BrrtError as error:
             raise self.damaged(str(error)) from None
         return events
+
+    def _tables(
+        self, raw: bytes, index: Mapping[int, NDArray[np.uint64]]
+    ) -> tuple[dict[Kind, NDArray[np.void]], int]:
+        """Decode the messages of our channels; return how many bytes they are, too."""
+        tables, size = dict[Kind, NDArray[np.void]](), 0
+        for number, offsets in index.items():
+            channel = self.channels.get(number)
+            if channel is not None and len(offsets):
+                if channel.kind in tables:
+                    raise self.damaged(f"two channels hold events of kind {channel.kind.label}")
+                tables[channel.kind] = self._table(raw, number, channel, offsets)
+                size += self._sizes(raw, channel, offsets)
+        return tables, size
 
     def _sizes(self, raw: bytes, channel: _Channel, offsets: NDArray[np.uint64]) -> int:
         """Bytes of messages, of which `_table` has seen that they are some."""
@@ -225,6 +199,9 @@ class _Decoder:
         """Index the messages of a chunk by going from one to the next."""
         found: dict[int, list[int]] = {}
         while at < len(raw):
+            if raw[at] in _DECLARATIONS and at + 9 <= len(raw):
+                at = self._declare(raw, at)
+                continue
             if at + RECORD_HEAD.itemsize > len(raw) or self.searched > _MOST_SEARCHED:
                 raise self.damaged("a chunk without its index")
             opcode, length, channel = struct.unpack_from("<BQH", raw, at)
@@ -298,7 +275,7 @@ def _batches(path: Path, manifest: Manifest) -> Iterator[Events]:
                     raise decoder.damaged("a message outside of a chunk, as brrt writes none")
                 elif opcode == Opcode.METADATA:
                     metadata = parsed(path, records.Metadata, data)
-                    figures = _figures(path, data) if metadata.name == RESULT else figures
+                    figures = figures_of(path, data) if metadata.name == RESULT else figures
         except CutError as error:
             if chunk is not None:
                 yield decoder.events(chunk, index)

@@ -79,13 +79,13 @@ def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tupl
             if check_end:
                 if stated and stated != crc:
                     raise RecordingError(f"{path}: damaged: the checksum of the data differs")
-                _check_summary(path, file)
+                check_summary(path, file)
             return
         crc = zlib.crc32(data, zlib.crc32(head, crc))
         yield opcode, data
 
 
-def _check_summary(path: Path, file: IO[bytes]) -> None:
+def check_summary(path: Path, file: IO[bytes]) -> None:
     """See that what follows the data is whole: summary, footer, magic.
 
     Raises:

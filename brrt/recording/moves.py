@@ -6,8 +6,12 @@ from brrt.events import Events, Kind, Table
 from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows
 from brrt.recording.paths import draw_bodies
-from brrt.recording.sketch import DRAWN_IN_FULL, Thinning, thinned
+from brrt.recording.sketch import Thinning, thinned
 from brrt.scenario import Manifest
+
+_IN_SPACE = (2000, 20**3)
+"""In 3D, moves to cells that are drawn in full, and parts of the world with one each after that:
+where a robot goes to and fro, they would hide what it learns."""
 
 
 class Moves:
@@ -19,13 +23,20 @@ class Moves:
     """
 
     def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
-        self._canvas, self._thinning = canvas, Thinning(canvas.world)
+        edge = float(manifest.scenario.settings().get("epsilon", 0.0))
+        limits = _IN_SPACE if edge and canvas.dim > 2 else ()
+        self._canvas, self._thinning = canvas, Thinning(canvas.world, *limits)
         self._start = canvas.places([manifest.start])
         self._at, self._drawn = self._start, 0
-        canvas.style(scene.TRACE_ENTITY, canvas.lines, scene.TRACE, -0.5, 28.0)
+        colour = scene.TRACE_ON_CELLS[canvas.dim] if edge else scene.TRACE
+        canvas.style(scene.TRACE_ENTITY, canvas.lines, colour, -0.4 if edge else -0.5, 28.0)
         canvas.style(scene.ROBOT_ENTITY, canvas.points, scene.ROBOT, -5, 60.0)
         if canvas.dim == 2:
             canvas.style(scene.BODY_ENTITY, canvas.lines, scene.ROBOT, -1.5, 55.0)
+        self._edge = edge
+        if edge:
+            canvas.style(scene.TAIL_ENTITY, canvas.points, scene.ROBOT, -1.25, 30.0)
+            canvas.style(scene.CELL_ENTITY, canvas.boxes, scene.ROBOT, -1, 58.0)
 
     def write(self, events: Events) -> None:
         """Draw the moves of a batch."""
@@ -37,6 +48,11 @@ class Moves:
             rows, ones = table[shown], np.ones(len(shown), np.int64)
             points = self._canvas.points.columns(positions=places[shown])
             self._canvas.send_rows(scene.ROBOT_ENTITY, rows, ones, points)
+            if self._edge:
+                self._canvas.send_rows(scene.TAIL_ENTITY, rows, ones, points)
+                half = np.full((len(rows), self._canvas.dim), self._edge / 2, np.float32)
+                cells = self._canvas.boxes.columns(centers=places[shown], half_sizes=half)
+                self._canvas.send_rows(scene.CELL_ENTITY, rows, ones, cells)
             if self._canvas.robot.outline(table["q"][0]):
                 draw_bodies(self._canvas, scene.BODY_ENTITY, rows, [[q] for q in rows["q"]])
 
@@ -47,7 +63,7 @@ class Moves:
         self._at = places[-1:]
         worth = self._thinning.worth(places)
         if self._thinning.begins_within(len(table)):
-            text = f"moves: beyond {DRAWN_IN_FULL:,} only those to new places are drawn"
+            text = f"moves: beyond {self._thinning.full:,} only those to new places are drawn"
             self._canvas.tell(table[-1], text)
         if worth.any():
             rows = table[worth]

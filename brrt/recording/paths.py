@@ -17,8 +17,9 @@ _LEAST_GAIN = 1e-3
 """How much shorter an improved path must be than the one in sight to take its place, as a part of
 it; the last one of a batch always does. So there are some hundred of them and a few more."""
 
-_GHOSTS = 24
-"""Places along a path at which the body is shown."""
+_GHOSTS, _APART = 24, 0.07
+"""Places along a path at which the body is shown, at most, and how far it moves between two at
+least, as a part of the world's extent: closer ones are a blot."""
 
 
 class Paths:
@@ -96,7 +97,8 @@ class Paths:
         path, robot = event["waypoints"], self._canvas.robot
         if not robot.outline(path[0]):
             return
-        bodies = list(robot.along(path, _GHOSTS))
+        steps = float(event["cost"]) / (_APART * self._canvas.world.extent)
+        bodies = list(robot.along(path, int(np.clip(steps + 1, 2, _GHOSTS))))
         draw_bodies(self._canvas, scene.GHOSTS_ENTITY, moments([event]), [bodies])
 
 

@@ -37,15 +37,18 @@ REWIRED: Mapping[str, Colour] = {"start": (150, 235, 255), "goal": (255, 190, 22
 LINK: Colour = (255, 236, 170)
 GHOST: Colour = (150, 128, 60)
 TRACE: Colour = (205, 205, 215)
+TRACE_ON_CELLS: Mapping[int, Colour] = {2: (24, 26, 34), 3: (130, 132, 146)}
+"""By dimensions: in 2D it lies on the cells that were visited, in 3D among them."""
 ROBOT: Colour = (255, 255, 255)
 NEWEST: Colour = (120, 170, 235)
 LINK_ENTITY, GHOSTS_ENTITY = "/world/link", "/world/path/bodies"
 TRACE_ENTITY, ROBOT_ENTITY, BODY_ENTITY = "/world/trace", "/world/robot", "/world/robot/body"
 CELLS_ENTITY, SEARCH_ENTITY = "/world/cells/expanded", "/world/cells/search"
+CELL_ENTITY, TAIL_ENTITY = "/world/cells/current", "/world/tail"
 _GROWING = (TRACE_ENTITY, CELLS_ENTITY, SEARCH_ENTITY)
 
-_HEAT = ((48, 40, 92), (50, 80, 130), (36, 124, 128), (96, 170, 88), (232, 214, 66))
-"""From cheap to dear."""
+_HEAT = ((98, 74, 190), (54, 110, 200), (30, 158, 164), (112, 196, 92), (250, 224, 60))
+"""From cheap to dear, bright enough all the way for a dark ground."""
 _TREES: Mapping[int, tuple[str, Colour]] = {
     0: ("start", (74, 144, 255)),
     1: ("goal", (255, 82, 82)),
@@ -57,8 +60,9 @@ _PATHS: Mapping[Stage, tuple[Colour, float]] = {
 }
 FADING_ITERATIONS, FADING_EVENTS, FADING_SECONDS = 300, 1000, 0.001
 """How long samples and rejections stay in sight on each timeline."""
-_BRIEFER = 5
-"""Rewired edges stay for a part of that: there may be several in an iteration."""
+_BRIEFER, _TAIL = 5, 12
+"""Rewired edges stay for a part of that: there may be several in an iteration. The places that a
+robot has just left stay for another part."""
 
 
 _TIMELINES = ("iteration", "event", "t")
@@ -136,6 +140,8 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
         "settings": ", ".join(f"{name}={value}" for name, value in settings.items()),
         "made by": ", ".join(f"{name} {value}" for name, value in manifest.made_by.items()),
     }
+    for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
+        rows[f"at iteration {branch.iteration:,} of {branch.file}"] = branch.told(after)
     rows = _results(figures) | rows
     table = "".join(f"| {name} | {_cell(value)} |\n" for name, value in rows.items())
     return f"### {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"
@@ -144,8 +150,10 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
 def _results(figures: Mapping[str, Any] | None) -> dict[str, str]:
     if figures is None:
         return {}
-    rows = {"status": f"{figures['status']} after {figures['iterations']:,} iterations"}
-    rows["nodes"] = f"{figures['nodes']:,}"
+    plural = "" if figures["iterations"] == 1 else "s"
+    rows = {"status": f"{figures['status']} after {figures['iterations']:,} iteration{plural}"}
+    what = "cells" if figures["expanded"] else "nodes"
+    rows[what] = f"{figures['expanded'] or figures['nodes']:,}"
     if figures["plan_time_s"] is not None:
         rows["planning"] = f"{figures['plan_time_s'] * 1e3:.4g} ms"
     for name, key in (("path", "path_cost"), ("smoothed", "smoothed_cost")):
@@ -233,6 +241,7 @@ def world_view(world: World, *, below: str = "", name: str = "World") -> Any:
     recent, just_now = _last(1), _last(_BRIEFER)
     shown = {f"/world/tree/{name}": past for name, _ in _TREES.values()}
     shown |= dict.fromkeys(_GROWING, past)
+    shown[TAIL_ENTITY] = _last(_TAIL)
     shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
     shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
     shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}

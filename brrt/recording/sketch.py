@@ -35,14 +35,17 @@ class Thinning:
 
     Args:
         world: Where these are.
+        full: The number; None takes `DRAWN_IN_FULL`.
+        cells: Of the grid over the world, about; None takes `_CELLS`.
 
     Attributes:
         count: Items that have come.
+        full: As given.
     """
 
-    def __init__(self, world: World) -> None:
-        self.count = 0
-        side = int(_CELLS ** (1 / world.dim))
+    def __init__(self, world: World, full: int | None = None, cells: int | None = None) -> None:
+        self.count, self.full = 0, DRAWN_IN_FULL if full is None else full
+        side = int((_CELLS if cells is None else cells) ** (1 / world.dim) + 1e-9)
         self._lower = world.lower.astype(np.float32)
         self._scale = (side / (world.upper - world.lower)).astype(np.float32)
         self._grid = (side,) * world.dim
@@ -52,7 +55,7 @@ class Thinning:
         """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
         steps = ((places - self._lower) * self._scale).astype(np.intp)
         cells = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
-        begin = min(max(DRAWN_IN_FULL - self.count, 0), len(places))
+        begin = min(max(self.full - self.count, 0), len(places))
         self._taken[cells[:begin]] = True
         late = cells[begin:]
         new = np.flatnonzero(~self._taken[late])
@@ -65,7 +68,7 @@ class Thinning:
 
     def begins_within(self, count: int) -> bool:
         """Whether it first left something out among the last so many items."""
-        return self.count - count <= DRAWN_IN_FULL < self.count
+        return self.count - count <= self.full < self.count
 
 
 class Sketch:
@@ -73,14 +76,15 @@ class Sketch:
 
     Args:
         world: Where they are.
+        thinning: What decides which of them are worth drawing.
 
     Attributes:
         drawn: Nodes that were worth drawing; each has a slot, numbered from 0.
-        thinning: What decides about that.
+        thinning: As given.
     """
 
-    def __init__(self, world: World) -> None:
-        self.drawn, self.thinning = 0, Thinning(world)
+    def __init__(self, world: World, thinning: Thinning | None = None) -> None:
+        self.drawn, self.thinning = 0, thinning or Thinning(world)
         self._places = np.full((1024, world.dim), np.nan, np.float32)
         self._slots = np.full(1024, -1, np.int32)
 

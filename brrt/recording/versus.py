@@ -14,19 +14,27 @@ Comparable = Path | str | Recording | tuple[Manifest, World, Events | Iterable[E
 """A file, an open recording, or a run in memory: manifest, world and events or batches of them."""
 
 
-def compare(a: Comparable, b: Comparable, *, names: tuple[str, str] | None = None) -> Comparison:
+def compare(
+    a: Comparable,
+    b: Comparable,
+    *,
+    names: tuple[str, str] | None = None,
+    tolerance: float = 0.0,
+) -> Comparison:
     """Compare two runs; their events are read up to the first difference and no further.
 
     Args:
         a: The first run.
         b: The second run.
         names: What they are called; by default files are called as they are.
+        tolerance: How far apart the events' numbers may be; by default every bit counts. It is
+            relative to the greater of the two, and to 1 where both are less.
 
     Raises:
         RecordingError: A file cannot be read, or is cut or damaged ahead of the first difference.
     """
     called = names or ("", "")
-    return compare_sides(_side(a, called[0]), _side(b, called[1]))
+    return compare_sides(_side(a, called[0]), _side(b, called[1]), tolerance)
 
 
 def _side(run: Comparable, name: str) -> Side:

@@ -91,6 +91,10 @@ class Account:
             yield "with " + ", ".join(f"{name} {_text(value)}" for name, value in settings.items())
         ends = (self._manifest.start, self._manifest.goal)
         yield "from {} to {}".format(*(", ".join(map(_text, q)) for q in ends))
+        for branch, (_, after) in zip(
+            self._manifest.branches, self._manifest.stretches[1:], strict=True
+        ):
+            yield f"at iteration {branch.iteration:,} of {branch.file}: " + branch.told(after)
 
     def _count(self, events: Events, first: int, end: int) -> None:
         """Count the events whose numbers lie in a range."""

@@ -44,9 +44,9 @@ class Growth:
                 cannot be made.
         """
         edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
-        for number in np.union1d(edges["tree"], rewires["tree"]).tolist():
+        for number in sorted({*_trees_in(edges), *_trees_in(rewires)}):
             tree = self._trees.setdefault(number, _Growing(number))
-            tree.write(*(table[table["tree"] == number] for table in (edges, rewires)))
+            tree.write(*(_rows_of(table, number) for table in (edges, rewires)))
 
     def close(self, *, whole: bool = True) -> None:
         """Nothing to release."""
@@ -58,6 +58,16 @@ class Growth:
             RecordingError: A node is its own ancestor, or its parent is not there.
         """
         return [self._trees[number].figures() for number in sorted(self._trees)]
+
+
+def _trees_in(table: Table) -> list[int]:
+    return np.flatnonzero(np.bincount(table["tree"])).tolist()
+
+
+def _rows_of(table: Table, tree: int) -> Table:
+    """Return the events of one tree; they are not copied where that is all of them."""
+    mine = table["tree"] == tree
+    return table if mine.all() else table[mine]
 
 
 @dataclass(slots=True)

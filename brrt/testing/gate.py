@@ -1,12 +1,12 @@
 """A gate on the figures of many seeds: did a change make a planner worse by more than a margin?
 
-Runs of the same seed are pairs. Of each figure it is tested whether the new one, divided by
-1 + margin, is larger than the old one: by Wilcoxon's signed ranks on the logarithms, with the exact
-distribution. That paths are no longer found is tested by McNemar's exact test. Where the change
-does no harm beyond the margins, that is where within each pair old and scaled new could as well be
-swapped, or the new is smaller, all tests together fail with a chance of at most alpha (Bonferroni).
-Nothing is assumed of how the figures are distributed. A gate always comes to the same verdict on
-the same code, so it does not fail today and pass tomorrow.
+Runs of the same seed are pairs. That paths are no longer found is tested by McNemar's exact test.
+Where both found one, it is tested of each figure whether the new one, divided by 1 + margin, is
+larger than the old one: by Wilcoxon's signed ranks on the logarithms, with the exact distribution.
+Where a change does no harm beyond the margins, that is where within each pair old and scaled new
+could as well be swapped, or the new is smaller, all tests together fail with a chance of at most
+alpha (Bonferroni). Nothing is assumed of how the figures are distributed. On the same code a gate
+always comes to the same verdict: it does not pass today and fail tomorrow.
 
 `benchmarks/gate.py` measures false alarms, and what is found with which chance.
 """
@@ -36,7 +36,8 @@ class Judged:
     Attributes:
         name: The figure.
         margin: Relative increase that is allowed; None for `solved`, where none is.
-        old: Median, infinite where most runs found no path; of `solved`, how many did.
+        old: Median of the pairs in which both found a path, not a number where there is none; of
+            `solved`, how many did.
         new: The same of the new runs.
         at_least: Relative increase that the data prove, at the confidence of this test.
         p: How likely figures this much worse are where no harm was done.
@@ -86,9 +87,8 @@ class Verdict:
         share = self.alpha / len(self.figures)
         rows = [_ROW.format("", "old", "new", "change", "proven", "allowed", "p", "").rstrip()]
         rows += [_row(each, self.seeds) for each in self.figures]
-        rows += [
-            f"failed where p <= {share:.2g}: a false alarm once in {1 / self.alpha:,.0f} changes"
-        ]
+        often = f"{1 / self.alpha:,.0f} changes"
+        rows += [f"failed where p <= {share:.2g}: a false alarm at most once in {often}"]
         for each in self.figures:
             if not each.passed and each.worst is not None:
                 rows.append(f"look at seed {each.worst}, whose {each.name} grew most")
@@ -107,7 +107,7 @@ class Verdict:
         }  # fmt: skip
 
 
-_ROW = "  {:22}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9} {}"
+_ROW = "  {:20}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8} {}"
 
 
 def gate(
@@ -131,8 +131,7 @@ def gate(
         alpha: Chance of a false alarm over all figures together.
         name: What the verdict calls it.
         margins: For each figure, the relative increase that is allowed: `cost` (of the final path)
-            or any count or cost that `brrt plan --json` prints. A run that found no path counts as
-            worse than any that did.
+            or any count or cost that `brrt plan --json` prints.
 
     Raises:
         BrrtError: A figure is unknown, the seeds are too few to find anything, or the two are
@@ -153,14 +152,14 @@ def judge(
     _check_problem(new, old)
     seeds = list(new.runs)
     pairs = [(old.runs[seed], new.runs[seed]) for seed in seeds]
+    found = [seed for seed, (a, b) in zip(seeds, pairs, strict=True) if a["solved"] and b["solved"]]
     share = alpha / (len(margins) + 1)
     judged = [_solved(pairs, share)]
-    known = set().union(*old.runs.values(), *new.runs.values()) - {"solved"}
-    for figure, margin in margins.items():
-        # Where no run found a path, none has a cost, and its name is as good as any.
-        if figure not in known and any(run["solved"] for pair in pairs for run in pair):
-            raise unknown("figure", figure, known)
-        judged.append(_judge(figure, margin, pairs, seeds, share))
+    judged += [
+        _judge(figure, margin, [(old.runs[n], new.runs[n]) for n in found], found, share)
+        for figure, margin in margins.items()
+    ]
+    _check_solved(judged[0], margins, alpha)
     identical = all(a[figure] == b[figure] for a, b in pairs for figure in a.keys() & b.keys())
     return Verdict(name, len(seeds), alpha, identical, tuple(judged))
 
@@ -168,15 +167,19 @@ def judge(
 def _judge(
     name: str, margin: float, pairs: list[tuple[Any, Any]], seeds: list[int], share: float
 ) -> Judged:
-    old, new = (
-        np.array([_value(pair[side], name) for pair in pairs], np.float64) for side in (0, 1)
-    )
+    for run in (run for pair in pairs for run in pair):
+        if name not in run:
+            raise unknown("figure", name, run.keys() - {"solved"})
+    if not pairs:
+        return Judged(name, margin, math.nan, math.nan, -math.inf, 1.0, True, None)
+    old, new = (np.array([pair[side][name] for pair in pairs], np.float64) for side in (0, 1))
     grown = ranks.log_ratios(old, new)
+    with np.errstate(over="ignore"):
+        proven = float(np.expm1(ranks.at_least(grown, share)))
     p = ranks.signed_rank(ranks.log_ratios(old, new / (1 + margin)))
-    proven = ranks.at_least(grown, share)
     return Judged(
         name, margin, float(np.median(old)), float(np.median(new)),
-        math.expm1(proven), p, p > share, seeds[int(np.argmax(grown))],
+        proven, p, p > share, seeds[int(np.argmax(grown))],
     )  # fmt: skip
 
 
@@ -185,11 +188,6 @@ def _solved(pairs: list[tuple[Any, Any]], share: float) -> Judged:
     lost = sum(a and not b for a, b in zip(old, new, strict=True))
     p = ranks.sign_test(lost, sum(b and not a for a, b in zip(old, new, strict=True)))
     return Judged("solved", None, sum(old), sum(new), -math.inf, p, p > share, None)
-
-
-def _value(run: Mapping[str, Any], name: str) -> float:
-    value = run.get(name)
-    return math.inf if value is None or not run["solved"] else float(value)
 
 
 def _figures(source: Source | Figures | Path | str, name: str, seeds: list[int]) -> Figures:
@@ -216,11 +214,25 @@ def check_question(seeds: list[int], alpha: float, margins: Mapping[str, Any]) -
             raise BrrtError(f"margin of {name} must be from 0 on (0.02: 2 %), not {margin!r}")
     if len(set(seeds)) < len(seeds):
         raise BrrtError("seeds must differ from each other")
-    least = math.ceil(math.log2((len(margins) + 1) / alpha))
+    least = _least(margins, alpha)
     if len(seeds) < least:
         raise BrrtError(
             f"{len(seeds)} seeds prove nothing at alpha={alpha:g} with {len(margins)} figures; "
             f"give at least {least}, better {SEEDS}"
+        )
+
+
+def _least(margins: Mapping[str, Any], alpha: float) -> int:
+    """Return how many pairs it takes to fail at all, were each of them worse."""
+    return math.ceil(math.log2((len(margins) + 1) / alpha))
+
+
+def _check_solved(solved: Judged, margins: Mapping[str, Any], alpha: float) -> None:
+    least = _least(margins, alpha)
+    if margins and solved.old < least:
+        raise BrrtError(
+            f"the old runs found {solved.old:.0f} paths, and it takes {least} to prove anything of "
+            f"{', '.join(margins)}; give more seeds or a larger budget"
         )
 
 
@@ -239,15 +251,14 @@ def _row(each: Judged, seeds: int) -> str:
     if each.margin is None:
         counts = (f"{count:.0f}/{seeds}" for count in (each.old, each.new))
         return _ROW.format(each.name, *counts, "", "", "", p, mark).rstrip()
-    medians = ["no path" if math.isinf(m) else f"{m:.5g}" for m in (each.old, each.new)]
-    told = each.old > 0 and "no path" not in medians
-    change = _percent(each.new / each.old - 1) if told else ""
+    medians = ["no path" if math.isnan(m) else f"{m:.5g}" for m in (each.old, each.new)]
+    change = _percent(each.new / each.old - 1) if each.old > 0 else ""
     proven = _percent(each.at_least) if math.isfinite(each.at_least) else ""
     return _ROW.format(each.name, *medians, change, proven, _percent(each.margin), p, mark).rstrip()
 
 
 def _percent(ratio: float) -> str:
-    return f"{100 * ratio:+.3g} %"
+    return f"{100 * ratio:+.3g} %" if ratio < 100 else f"x{1 + ratio:.3g}"
 
 
 def _plain(value: Any) -> Any:

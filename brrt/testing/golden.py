@@ -6,16 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from brrt.again import RepeatedRun
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Kind, Table
+from brrt.events import Events
 from brrt.files import replacing
 from brrt.planners import PLANNERS
 from brrt.recording import McapSink, Memory, Recording, read
 from brrt.run import Run
 from brrt.scenario import Scenario
-from brrt.worlds import GENERATORS
 
 TICK_NS = 1000
 """Between two events by the logical clock."""
@@ -57,21 +55,17 @@ def _made(run: Run) -> Recording:
     return Recording(run.manifest, run.problem.world, lambda: iter(log.batches), result)
 
 
-def again(path: Path) -> Source:
-    """Return what makes a golden run anew: its own scenario, in its own world.
+def again(path: Path) -> Run:
+    """Return the run that makes a golden one anew, in the world that it has kept.
 
     Raises:
         BrrtError: The file cannot be read, or its planner is not one of brrt's.
     """
     kept = read(path)
-    scenario = kept.manifest.scenario
-    if scenario.planner not in PLANNERS:
-        raise BrrtError(
-            f"{path}: planner {scenario.planner} is not brrt's own; give the run to compare with"
-        )
-    if scenario.world.partition(":")[0] in GENERATORS:
-        return scenario
-    return Run(replace(scenario, clock="logical"), world=kept.world)
+    planner = kept.manifest.scenario.planner
+    if planner not in PLANNERS:
+        raise BrrtError(f"{path}: planner {planner} is not brrt's own; give the run as well")
+    return RepeatedRun(kept.manifest, kept.world)
 
 
 def save(recording: Recording, path: Path) -> None:
@@ -91,40 +85,6 @@ def save(recording: Recording, path: Path) -> None:
             sink.write(batch)
         stack.pop_all()
         sink.close(whole=True)
-
-
-def near(recording: Recording, golden: Recording, tolerance: float) -> Recording:
-    """Return a run with the golden one's numbers wherever its own are close to them.
-
-    Args:
-        recording: The run.
-        golden: What it is held against.
-        tolerance: For a float x of the golden run, an error of tolerance * max(1, |x|) is close.
-    """
-    if tolerance == 0 or recording.manifest.dof != golden.manifest.dof:
-        return recording
-    log, kept = recording.events(), golden.events()
-    tables = {kind: _near(kind, table, kept[kind], tolerance) for kind, table in log.tables.items()}
-    events = Events(log.dof, tables)
-    return replace(recording, batches=lambda: iter([events]))
-
-
-def _near(kind: Kind, table: Table, kept: Table, tolerance: float) -> Table:
-    table, n = table.copy(), min(len(table), len(kept))
-    for field in FIELDS[kind]:
-        ours, theirs = table[field.name][:n], kept[field.name][:n]
-        if field.type == "q[]":
-            for row in range(n):
-                if ours[row].shape == theirs[row].shape:
-                    ours[row] = _snapped(ours[row], theirs[row], tolerance)
-        elif np.issubdtype(ours.dtype, np.floating):
-            ours[...] = _snapped(ours, theirs, tolerance)
-    return table
-
-
-def _snapped(ours: Any, theirs: Any, tolerance: float) -> Any:
-    close = np.isclose(ours, theirs, rtol=0, atol=tolerance * np.maximum(1, np.abs(theirs)))
-    return np.where(close, theirs, ours)
 
 
 def _check_budget(scenario: Scenario) -> None:

@@ -24,6 +24,9 @@ CELLS = (1 << 12, 1 << 16, 1 << 18, 1 << 20)
 _ENOUGH = 12
 """Cells across a passage that is measured well enough."""
 
+_WIDE = 0.05
+"""Part of the map's longest side that is no narrow place: it need not be measured any better."""
+
 _FARTHEST = 32
 """Clearances beyond so many cells are taken to be that."""
 
@@ -77,7 +80,7 @@ def narrowest(world: World, start: Floats, goal: Floats) -> Passage | None:
         farthest = int(min(_FARTHEST, 0.5 * widest / size + 2))
         found = _measured(lattice, free, ends, farthest)
         widest = found.high
-        if found.high >= _ENOUGH * size:
+        if found.high >= _ENOUGH * size or found.low >= _WIDE * world.extent:
             break
     return found
 
@@ -137,7 +140,7 @@ def clearance(free: Bools, cell: Floats, farthest: int) -> Floats:
     for axis, side in enumerate(cell.tolist()):
         lines = np.moveaxis(square, axis, 0)
         before = lines.copy()
-        for k in range(1, min(farthest, len(lines) - 1) + 1):
+        for k in range(1, min(int(farthest * cell.max() / side), len(lines) - 1) + 1):
             apart = (k * side) ** 2
             np.minimum(lines[k:], before[:-k] + apart, out=lines[k:])
             np.minimum(lines[:-k], before[k:] + apart, out=lines[:-k])

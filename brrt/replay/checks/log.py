@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Kind, Phase, Source, Status, Table
+from brrt.events import FIELDS, Events, Kind, Phase, Status, Table
 from brrt.replay.checks.bodies import endless
-from brrt.replay.checks.case import Case, Tally
+from brrt.replay.checks.case import Case, Windows, waypoints
+from brrt.replay.checks.tally import Tally
 
 _HEAD = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
 
@@ -23,29 +24,38 @@ def heads(events: Events) -> Table:
     return heads[np.argsort(heads["seq"], kind="stable")]
 
 
-def numbering(case: Case, tally: Tally) -> None:
+def numbering(case: Case, tally: Tally) -> Windows:  # noqa: ARG001 - every rule takes both
     """Events are numbered 0, 1, 2 ..."""
-    log = heads(case.events)
-    steps = np.diff(log["seq"], prepend=-1)
-    tally.look(log, steps != 1, lambda i: f"event {log['seq'][i]} is number {i} of the log")
+    last, count = -1, 0
+    while (window := (yield)) is not None:
+        log = heads(window)
+        steps = np.diff(log["seq"], prepend=last)
+        tally.look(
+            log, steps != 1,
+            lambda i, log=log, n=count: f"event {log['seq'][i]} is number {n + i} of the log",  # type: ignore[misc]
+        )  # fmt: skip
+        last, count = int(log["seq"][-1]), count + len(log)
 
 
-def times(case: Case, tally: Tally) -> None:
+def times(case: Case, tally: Tally) -> Windows:  # noqa: ARG001 - every rule takes both
     """Time rises from event to event, and no time is below 0; iterations never fall."""
-    log = heads(case.events)
-    wrong = np.diff(log["t"], prepend=-1) <= 0
-    tally.look(
-        log, wrong, lambda i: f"time {log['t'][i]} ns does not follow {_before(log, 't', i)}"
-    )
-    back = np.diff(log["iteration"], prepend=0) < 0
-    tally.look(
-        log[back], np.ones(int(back.sum()), bool),
-        lambda i: f"iteration {log['iteration'][back][i]} follows a greater one",
-    )  # fmt: skip
-
-
-def _before(log: Table, name: str, i: int) -> str:
-    return "the beginning" if i == 0 else f"{log[name][i - 1]}"
+    t, iteration = -1, 0
+    while (window := (yield)) is not None:
+        log = heads(window)
+        before = np.concatenate([[t], log["t"][:-1]])
+        tally.look(
+            log, log["t"] <= before,
+            lambda i, log=log, b=before: (  # type: ignore[misc]
+                f"time {log['t'][i]} ns does not follow "
+                + ("the beginning" if b[i] < 0 else f"{b[i]}")
+            ),
+        )  # fmt: skip
+        back = log[np.diff(log["iteration"], prepend=iteration) < 0]
+        tally.look(
+            back, np.ones(len(back), bool),
+            lambda i, b=back: f"iteration {b['iteration'][i]} follows a greater one",  # type: ignore[misc]
+        )  # fmt: skip
+        t, iteration = int(log["t"][-1]), int(log["iteration"][-1])
 
 
 def phases(case: Case, tally: Tally) -> None:
@@ -73,16 +83,17 @@ def _phase(number: int) -> str:
     return f"phase {Phase(number).name.lower() if number in set(Phase) else number}"
 
 
-def names(case: Case, tally: Tally) -> None:
+def names(case: Case, tally: Tally) -> Windows:  # noqa: ARG001 - every rule takes both
     """Sources, reasons and stages are among those that there are."""
-    for kind, fields in FIELDS.items():
-        for field in fields:
-            table, choices = case.events[kind], field.choices
-            if choices is None or not len(table) or kind is Kind.PHASE:
-                continue
-            values, name = table[field.name], field.name
-            wrong = ~np.isin(values, [int(choice) for choice in choices])
-            tally.look(table, np.asarray(wrong), _naming(name, values))
+    while (window := (yield)) is not None:
+        for kind, fields in FIELDS.items():
+            for field in fields:
+                table, choices = window[kind], field.choices
+                if choices is None or not len(table) or kind is Kind.PHASE:
+                    continue
+                values, name = table[field.name], field.name
+                wrong = ~np.isin(values, [int(choice) for choice in choices])
+                tally.look(table, np.asarray(wrong), _naming(name, values))
 
 
 def _naming(name: str, values: NDArray[np.uint8]) -> Callable[[int], str]:
@@ -112,8 +123,7 @@ def _with_path(case: Case) -> set[Status]:
 def budget(case: Case, tally: Tally) -> None:
     """No more iterations, draws and attempts to smooth than allowed."""
     scenario, events = case.manifest.scenario, case.events
-    last = max((int(t["iteration"].max()) for t in events.tables.values() if len(t)), default=0)
-    made, begin = 0, 0
+    last, made, begin = case.kept.last_iteration, 0, 0
     adding = np.unique(events[Kind.EDGE]["iteration"])
     ends = [*(branch.iteration for branch in case.manifest.branches), last]
     for end, (_, ruling) in zip(ends, case.manifest.stretches, strict=True):
@@ -128,32 +138,25 @@ def budget(case: Case, tally: Tally) -> None:
         tally.one(None, f"{count:,} {what}; {limit:,} are allowed" if over else None)
 
 
-def bounds(case: Case, tally: Tally) -> None:
+def bounds(case: Case, tally: Tally) -> Windows:
     """Samples, nodes, cells, moves and waypoints lie in bounds, joint limits and [-pi, pi).
 
     The last is for angles that wrap: each configuration has one way of being written.
     """
-    slack = np.where(endless(case.robot, case.events.dof), 0.0, case.blur)
-    low, high = case.lower - slack, case.upper + slack
-    high = np.where(endless(case.robot, case.events.dof), np.nextafter(np.pi, 0), high)
-    for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE):
-        table = case.events[kind]
-        q = np.asarray(table["q"])
-        wrong = np.asarray(~((low <= q) & (q <= high)).all(axis=1))
-        tally.look(table, wrong, lambda i, k=kind, q=q: f"{k.label} at {text(q[i])}")  # type: ignore[misc]
-    for event, path in case.paths:
-        out = np.flatnonzero(~((low <= path) & (path <= high)).all(axis=1))
-        tally.one(event, f"waypoint {out[0]} at {text(path[out[0]])}" if len(out) else None)
-
-
-def samples(case: Case, tally: Tally) -> None:
-    """Samples of the goal are the goal; the other tree's goal is the start."""
-    table = case.events[Kind.SAMPLE]
-    goals = table[table["source"] == Source.GOAL]
-    q = np.asarray(goals["q"])
-    wrong = (q != case.goal).any(axis=1)
-    wrong &= (goals["tree"] != 1) | (q != case.start).any(axis=1)
-    tally.look(goals, wrong, lambda i: f"sample {text(goals['q'][i])} is not the goal")
+    turns = endless(case.robot, case.dof)
+    slack = np.where(turns, 0.0, case.blur)
+    low = case.lower - slack
+    high = np.where(turns, np.nextafter(np.pi, 0), case.upper + slack)
+    while (window := (yield)) is not None:
+        for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE):
+            table = window[kind]
+            q = np.asarray(table["q"])
+            wrong = np.asarray(~((low <= q) & (q <= high)).all(axis=1))
+            tally.look(table, wrong, lambda i, k=kind, q=q: f"{k.label} at {text(q[i])}")  # type: ignore[misc]
+        for event in window[Kind.PATH]:
+            path = waypoints(event, case.dof)
+            out = np.flatnonzero(~((low <= path) & (path <= high)).all(axis=1))
+            tally.one(event, f"waypoint {out[0]} at {text(path[out[0]])}" if len(out) else None)
 
 
 def text(q: NDArray[np.float64]) -> str:
@@ -161,5 +164,5 @@ def text(q: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(q).tolist()) + ")"
 
 
-RULES = (numbering, times, phases, names, outcome, budget, bounds, samples)
+RULES = (numbering, times, phases, names, outcome, budget, bounds)
 """All rules of this file; see `brrt.replay.checks`."""

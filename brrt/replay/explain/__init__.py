@@ -7,7 +7,6 @@ from brrt.replay.explain.advice import Advice, advise
 from brrt.replay.explain.facts import Facts, facts
 from brrt.replay.explain.gather import Gather
 from brrt.replay.explain.tell import Row, rows
-from brrt.replay.history import as_plain
 from brrt.replay.moment import Moment
 
 
@@ -29,7 +28,7 @@ class Explanation:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain numbers, texts, lists and dicts."""
-        return {**self.facts.as_dict(), "advice": as_plain(self.advice)}
+        return {**self.facts.as_dict(), "advice": [each.as_dict() for each in self.advice]}
 
 
 def explain(moment: Moment) -> Explanation:

@@ -1,10 +1,11 @@
 """What to try next: rules, each from figures to a command. None guesses beyond its figures."""
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+from brrt.replay.explain.command import command, text
 from brrt.replay.explain.facts import Facts
 from brrt.scenario import Scenario
 
@@ -13,6 +14,15 @@ MOST = 3
 
 _ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
 """What grows a second tree from the goal, instead of each planner."""
+
+_ENOUGH = 100
+"""Extensions from which on a run's course means anything."""
+
+_GROWING = 0.05
+"""Of what was reached, the part that must have come in the last third of a run that grows."""
+
+_SPREADING = 0.15
+"""The same of a run that still spreads: it is not stuck anywhere."""
 
 _CLIMBING = ("rrt-star", "bi-rrt-star")
 """Planners that go on improving."""
@@ -25,10 +35,16 @@ class Advice:
     Attributes:
         why: The figures that it follows from.
         command: The command that tries it.
+        scenario: What the command plans; None where it only looks.
     """
 
     why: str
     command: str
+    scenario: Scenario | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what a person reads."""
+        return {"why": self.why, "command": self.command}
 
 
 Rule = Callable[[Facts], Advice | None]
@@ -36,14 +52,13 @@ Rule = Callable[[Facts], Advice | None]
 
 def advise(facts: Facts) -> list[Advice]:
     """Return what follows from the figures, the most telling first; `MOST` at most."""
-    rules = _SOLVED if facts.figures["solved"] else _UNSOLVED
     found: list[Advice] = []
-    for rule in rules:
-        advice = rule(facts)
-        if advice is not None and advice.command not in [each.command for each in found]:
+    idle: set[Rule] = set()
+    for rule in _SOLVED if facts.figures["solved"] else _UNSOLVED:
+        advice = None if rule in idle else rule(facts)
+        if advice is not None:
             found.append(advice)
-        if advice is not None and rule is no_way:
-            break  # nothing else can help
+            idle.update(_INSTEAD.get(rule, ()))
     return found[:MOST]
 
 
@@ -71,21 +86,20 @@ def small_cells(f: Facts) -> Advice | None:
 def long_step(f: Facts) -> Advice | None:
     """Steps are longer than the passage is wide, and none got through it."""
     step = _step(f)
-    if step is None or f.narrow is None or not f.narrow.parts or f.narrow.behind:
-        return None
-    if step <= f.narrow.high:
+    if step is None or not _stuck(f) or f.narrow is None or step <= f.narrow.high:
         return None
     why = f"step {step:g} is longer than the passage {_width(f)} wide, and no node got through"
-    return _with(f, why, params={"step": _rounded(max(f.narrow.low, f.narrow.high / 2))})
+    return _with(f, why, params={"step": _rounded(max(f.narrow.low, f.narrow.high / 4))})
 
 
 def second_tree(f: Facts) -> Advice | None:
-    """One tree did not get through the passage, or has not come nearer for half of the run."""
+    """One tree stopped growing in front of the passage, or came no nearer for half of the run."""
     planner = _ONE_TREE.get(f.scenario.planner)
-    if planner is None or f.approach is None:
+    if planner is None or f.approach is None or f.accepted + f.failed < _ENOUGH:
         return None
-    stuck = f.narrow is not None and f.narrow.parts and not f.narrow.behind
-    if stuck:
+    if f.coverage is not None and f.coverage.late > _SPREADING:
+        return None
+    if _stuck(f):
         why = "no node got through the passage; a tree from the goal meets it from behind"
     elif f.approach.since >= 0.5:
         why = f"no node came nearer to the goal in the last {f.approach.since:.0%} of the run"
@@ -96,19 +110,17 @@ def second_tree(f: Facts) -> Advice | None:
 
 
 def short_step(f: Facts) -> Advice | None:
-    """Nearly all extensions succeed, and the tree is still small: steps are too short."""
-    step, coverage = _step(f), f.coverage
+    """The tree is small because its steps are short, and longer ones fit the passage."""
+    step, coverage, usual = _step(f), f.coverage, 0.05 * f.extent
     if step is None or coverage is None or f.acceptance is None:
         return None
-    usual = 0.05 * f.extent
-    if f.acceptance < 0.7 or coverage.share > 0.5 or step > usual / 2:
+    if f.acceptance < 0.1 or coverage.share > 0.5 or step > usual / 5:
         return None
-    why = (
-        f"{f.acceptance:.0%} of the extensions succeeded and {coverage.share:.0%} of the free "
-        f"space was reached: step {step:g} is short"
-    )
+    reached = f"{f.accepted:,} steps of {step:g} reached {coverage.share:.0%} of the free space"
     wide = usual if f.narrow is None else min(usual, max(f.narrow.low, 2 * step))
-    return _with(f, why, params={"step": _rounded(wide)})
+    if _stuck(f) and f.narrow is not None and wide > f.narrow.high:
+        return None
+    return _with(f, reached, params={"step": _rounded(wide)})
 
 
 def goal_bias(f: Facts) -> Advice | None:
@@ -128,16 +140,17 @@ def goal_bias(f: Facts) -> Advice | None:
 
 def longer(f: Facts) -> Advice | None:
     """The run was still getting somewhere when its budget ended."""
-    grew = f.coverage is not None and f.coverage.late >= 0.05 and bool(f.figures["nodes"])
-    came = f.approach is not None and f.approach.since <= 0.3
-    if not (grew or came) or f.figures["status"] not in ("iteration limit", "time limit"):
+    if f.figures["status"] not in ("iteration limit", "time limit"):
         return None
-    why = (
-        f"the tree came nearer to the goal until the last {f.approach.since:.0%} of the run"
-        if came and f.approach is not None
-        else f"{f.coverage.late:.0%} of what was reached came in the run's last third"  # type: ignore[union-attr]
-    )
-    return _with(f, f"{why}: it was still growing", **_more(f, 4))
+    if _grows(f) and f.coverage is not None:
+        why = f"{f.coverage.late:.0%} of what was reached came in the run's last third"
+        times = min(100, max(4, round(2 / f.coverage.share)))
+    elif f.approach is not None and f.approach.since <= 0.3:
+        why = f"it came nearer to the goal until the last {f.approach.since:.0%} of the run"
+        times = 4
+    else:
+        return None
+    return _with(f, f"{why}: it was still growing", **_more(f, times))
 
 
 def look_ahead(f: Facts) -> Advice | None:
@@ -198,21 +211,42 @@ def late_moves(f: Facts) -> Advice | None:
 
 
 def slow_tree(f: Facts) -> Advice | None:
-    """One tree needed many extensions, most of them in vain."""
-    if f.scenario.planner != "rrt" or f.acceptance is None:
+    """One tree spent most of the run in front of the passage, and reached nothing new there."""
+    if f.scenario.planner != "rrt" or f.narrow is None or f.narrow.through is None:
         return None
-    if f.accepted + f.failed < 1000 or f.acceptance > 0.7:
+    before = f.narrow.through / max(f.figures["iterations"], 1)
+    drought = 0.0 if f.coverage is None else f.coverage.drought
+    if f.accepted + f.failed < 1000 or before < 0.5 or drought < 0.3:
         return None
-    tried = f.accepted + f.failed
-    why = f"one tree took {tried:,} extensions, and {1 - f.acceptance:.0%} of them failed"
+    why = (
+        f"{before:.0%} of the run passed before a node got through the passage, and for "
+        f"{drought:.0%} of it nothing new was reached"
+    )
     step = f.scenario.params.get("step")
     return _with(f, why, planner="rrt-connect", params={} if step is None else {"step": step})
 
 
 _UNSOLVED: tuple[Rule, ...] = (
-    no_way, small_cells, goal_bias, short_step, second_tree, look_ahead, long_step, longer,
+    no_way, small_cells, goal_bias, short_step, second_tree, long_step, look_ahead, longer,
 )  # fmt: skip
 _SOLVED: tuple[Rule, ...] = (late_moves, short_step, slow_tree, look_ahead, enough, informed)
+
+_INSTEAD: Mapping[Rule, tuple[Rule, ...]] = {
+    no_way: _UNSOLVED,
+    goal_bias: (longer,),
+    short_step: (second_tree, longer),
+}
+"""Rules that have nothing to say once another one has found a cause."""
+
+
+def _stuck(f: Facts) -> bool:
+    """Whether a passage parts start and goal, and no node is behind it."""
+    return f.narrow is not None and f.narrow.parts and not f.narrow.behind
+
+
+def _grows(f: Facts) -> bool:
+    """Whether the run still reached new space in its last third."""
+    return f.coverage is not None and f.coverage.late >= _GROWING
 
 
 def _step(f: Facts) -> float | None:
@@ -241,62 +275,33 @@ def _rounded(value: float) -> float:
     return float(f"{int(value / size * (1 + 1e-12)) * size:.6g}")
 
 
-def _with(f: Facts, why: str, **changes: Any) -> Advice:
-    return Advice(why, command(f.scenario, **changes))
-
-
-def command(
-    scenario: Scenario,
+def _with(
+    f: Facts,
+    why: str,
     *,
     planner: str | None = None,
     params: Mapping[str, Any] | None = None,
-    out: str = "next.mcap",
     **budget: Any,
-) -> str:
-    """Write a scenario as the command that runs it, with changes.
+) -> Advice:
+    """Advise to run the same with changes.
 
     Args:
-        scenario: What was run.
+        f: What is known.
+        why: What the advice follows from.
         planner: Another planner; `params` are then all that is set.
         params: Settings that are changed.
-        out: What it records to.
         budget: Other fields of the scenario.
     """
-    before = scenario.params if planner is None else {}
-    settings = {**before, **(params or {})}
-    values = {**scenario.as_dict(), **budget, "planner": planner or scenario.planner}
-    words = ["brrt", "plan", *_options(values, Scenario().as_dict())]
-    for name, value in settings.items():
-        words += ["--param", f"{name}={_text(value)}"]
-    return shlex.join([*words, "--out", out])
-
-
-def _options(values: Mapping[str, Any], usual: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the options for what is not as usual; the seed always, and the world."""
-    names = ("world", "robot", "planner", "start", "goal", "seed", "iterations", "time",
-             "shortcuts", "max_move", "deadline")  # fmt: skip
-    for name in names:
-        value = values[name]
-        if value is not None and (value != usual[name] or name in ("world", "seed")):
-            text = value if isinstance(value, str) else _text(value)
-            option = f"--{name.replace('_', '-')}"
-            # A value that begins with a minus would be taken for an option.
-            yield from [f"{option}={text}"] if text.startswith("-") else [option, text]
-    if not values["smooth"]:
-        yield "--no-smooth"
-    if values["execute"]:
-        yield "--execute"
+    before = f.scenario.params if planner is None else {}
+    scenario = replace(
+        f.scenario,
+        planner=planner or f.scenario.planner,
+        params={**before, **(params or {})},
+        **budget,
+    )
+    return Advice(why, command(scenario), scenario)
 
 
 def _ends(f: Facts) -> list[str]:
     names = [name for name in ("start", "goal") if getattr(f.scenario, name) is not None]
-    return [f"--{name}={_text(getattr(f.manifest, name))}" for name in names]
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return ",".join(_text(x) for x in value)
-    if isinstance(value, bool):
-        return str(value).lower()
-    short = f"{value:g}" if isinstance(value, float) else str(value)
-    return short if isinstance(value, str) or float(short) == value else repr(value)
+    return [f"--{name}={text(getattr(f.manifest, name))}" for name in names]

@@ -64,11 +64,13 @@ class Coverage:
         cells: Cells with anything free in them.
         share: Share of these with a node, or an expanded cell, in them.
         late: Share of the reached ones that were first reached in the run's last third.
+        drought: Share of the run in the longest stretch in which none was reached first.
     """
 
     cells: int
     share: float
     late: float
+    drought: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,8 +182,10 @@ class Places:
         inside = index[:, None] + rng.random((n, _POINTS, index.shape[1]))
         points = (lattice.lower + inside * lattice.cell).reshape(-1, index.shape[1])
         free = ~covered(self._world, points).reshape(n, _POINTS).all(axis=1) | reached
-        late = float((first[reached] > last * 2 / 3).mean())
-        return Coverage(int(free.sum()), float(reached.sum() / free.sum()), late)
+        news = np.sort(first[reached])
+        late = float((news > last * 2 / 3).mean())
+        drought = float(np.diff(news, prepend=0, append=last).max() / max(last, 1))
+        return Coverage(int(free.sum()), float(reached.sum() / free.sum()), late, drought)
 
     def narrow(self, start: Floats, goal: Floats) -> tuple[bool | None, str, Narrow | None]:
         """Say whether there is a way for a point, on what that rests, and how narrow it is."""
@@ -198,7 +202,7 @@ class Places:
             behind = int(passed.sum())
             through = int(self._gather.iterations(tree)[passed][0]) if behind else None
         if not self._gather.trees:
-            behind = int(found.passed(self._gather.cells.q).sum())
+            behind = int(found.passed(self._robot.places(self._gather.cells.q)).sum())
         reason = f"free cells of {found.cell:.3g} lead to the goal"
         place = found.place.tolist()
         return True, reason, Narrow(found.low, found.high, place, parts, behind, through)

@@ -161,8 +161,8 @@ def _cells(f: Facts) -> Iterator[Row]:
     yield (
         "moves",
         (
-            f"{cells['moves']:,}; each cell was entered {cells['moves_per_cell']:.3g} times, that at "
-            f"{_place(busiest['q'])} {busiest['visits']:,} times"
+            f"{cells['moves']:,}; each cell was entered {cells['moves_per_cell']:.3g} times, "
+            f"that at {_place(busiest['q'])} {busiest['visits']:,} times"
         ),
     )
     if deepest["learnt"] > 0:

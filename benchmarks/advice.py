@@ -1,0 +1,116 @@
+"""Whether it helps to do what `brrt explain` advises: made cases, each over several seeds.
+
+python benchmarks/advice.py            every case
+python benchmarks/advice.py bugtrap    those whose name has that in it
+
+For each case: how often its own settings solve it, and their median work; then the same for each
+piece of advice, by the rule that gave it, on the seeds that got it. Work is extensions tried and
+cells expanded, smoothing aside.
+"""
+
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from brrt import Memory, Recording, Run, Scenario, World
+from brrt.replay.explain import Advice, explain
+
+SEEDS = 10
+
+
+def walled_off() -> World:
+    """A goal behind four walls that leave no way in."""
+    boxes = [[60, 60, 95, 62], [60, 93, 95, 95], [60, 60, 62, 95], [93, 60, 95, 95]]
+    start, goal = np.array([5.0, 5.0]), np.array([80.0, 80.0])
+    sides = np.zeros(2), np.full(2, 100.0)
+    return World("walled", *sides, boxes=np.array(boxes, float), start=start, goal=goal)
+
+
+CASES: dict[str, tuple[dict[str, Any], World | None]] = {
+    "narrow gap": ({"world": "gap2d:gap=1", "iterations": 3000}, None),
+    "long passage": ({"world": "passage2d:gap=2", "iterations": 3000}, None),
+    "long passage, long step": (
+        {"world": "passage2d:gap=2", "iterations": 5000, "params": {"step": 20}}, None,
+    ),
+    "bug trap": ({"world": "bugtrap2d", "iterations": 2000}, None),
+    "bug trap 3D": ({"world": "bugtrap3d", "iterations": 3000}, None),
+    "walled-off goal": ({"iterations": 2000}, walled_off()),
+    "tiny step": ({"world": "circles2d", "iterations": 2000, "params": {"step": 0.2}}, None),
+    "small budget": ({"world": "maze2d", "iterations": 500}, None),
+    "no goal bias": ({"world": "empty2d", "params": {"goal_bias": 0, "step": 2},
+                      "iterations": 1000}, None),
+    "greedy bias": ({"world": "enclosure2d", "params": {"goal_bias": 0.9},
+                     "iterations": 2000}, None),
+    "late passage": ({"world": "gap2d:gap=1", "iterations": 30_000}, None),
+    "late bug trap": ({"world": "bugtrap2d", "iterations": 30_000}, None),
+    "slow tree": ({"world": "maze2d", "iterations": 20_000}, None),
+    "star, too long": ({"world": "circles2d:n=20", "planner": "rrt-star",
+                        "iterations": 20_000}, None),
+    "star, short": ({"world": "circles2d:n=60", "planner": "rrt-star", "iterations": 1500}, None),
+    "star, gap": ({"world": "gap2d:gap=1", "planner": "rrt-star", "iterations": 3000}, None),
+    "lrta, bug trap": ({"world": "bugtrap2d", "planner": "lrta-star",
+                        "params": {"epsilon": 2}}, None),
+    "a-star, coarse cells": ({"world": "passage2d:gap=2", "planner": "a-star",
+                              "params": {"epsilon": 7}}, None),
+}  # fmt: skip
+
+
+def run(scenario: Scenario, world: World | None) -> tuple[dict[str, Any], Recording]:
+    """Run a scenario; return its figures and the recording."""
+    made = Run(scenario, world=world)
+    log = Memory()
+    figures = made.execute([log]).as_dict()
+    return figures, Recording(made.manifest, made.problem.world, lambda: iter(log.batches), None)
+
+
+def work(figures: dict[str, Any]) -> int:
+    """Extensions tried, and cells expanded."""
+    return int(figures["nodes"] + figures["rejects"] + figures["expanded"])
+
+
+def told(name: str, runs: list[dict[str, Any]]) -> str:
+    """Sum up runs in a line."""
+    solved = [figures for figures in runs if figures["solved"]]
+    costs = f"  cost {median(f['path_cost'] for f in solved):8.5g}" if solved else ""
+    effort = median(work(figures) for figures in runs)
+    return f"{name:34} {len(solved):3} of {len(runs):2} solved  work {effort:9,.0f}{costs}"
+
+
+def lines(case: str) -> Iterator[str]:
+    """Run a case with each seed, follow all advice, and sum up."""
+    values, world = CASES[case]
+    before, after = [], defaultdict(list)
+    for seed in range(SEEDS):
+        scenario = Scenario(seed=seed, **values)
+        figures, recording = run(scenario, world)
+        before.append(figures)
+        for advice in explain(recording.at()).advice:
+            after[_changes(scenario, advice)].append((figures, advice.scenario))
+    yield told(case, before)
+    for changes, given in after.items():
+        plans = [(figures, plan) for figures, plan in given if plan is not None]
+        if not plans:
+            yield f"   {changes}: {len(given)} times"
+            continue
+        yield told("   where advised: " + changes[:18], [figures for figures, _ in plans])
+        yield told("   " + changes, [run(plan, world)[0] for _, plan in plans])
+
+
+def _changes(scenario: Scenario, advice: Advice) -> str:
+    """Name what a piece of advice changes."""
+    if advice.scenario is None:
+        return advice.command.partition(" --")[0]
+    old, new = scenario.as_dict(), advice.scenario.as_dict()
+    names = [name for name in new if name != "params" and new[name] != old[name]]
+    names += [name for name in new["params"] if new["params"][name] != old["params"].get(name)]
+    return ", ".join(str(new["planner"]) if name == "planner" else name for name in names)
+
+
+if __name__ == "__main__":
+    for name in CASES:
+        if all(part in name for part in sys.argv[1:]):
+            print("\n".join(lines(name)), flush=True)

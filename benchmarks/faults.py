@@ -1,0 +1,333 @@
+"""Kill runs while they record, and spoil recordings: what is left, and what does a reader say?
+
+    python benchmarks/faults.py [--kills 200] [--copies 2000] [--seed 0]
+
+Kills: a run that records at full speed into both files is killed (SIGKILL) at a random moment. It
+notes how many events it has handed over, and the time of the last. Of each file that is left, the
+events must be those of the other file as far as they go, of what was handed over at most a second
+or a chunk may be missing, and `brrt recover` must make a file of them that `brrt verify` and stock
+mcap take.
+
+Copies: bytes are flipped, blocks swapped, doubled, blanked or cut off, in files of runs that ended
+and of runs that were killed. Each copy must read as the original does, or as the beginning of it
+and an error of one line, within 5 seconds. Exit code 1 if anything else happens.
+"""
+
+import argparse
+import contextlib
+import io
+import os
+import random
+import resource
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from subprocess import PIPE, Popen
+from typing import IO, Any, cast
+
+from mcap.reader import make_reader
+
+from brrt import BrrtError, Events, McapSink, Run, Scenario, first_difference, read
+from brrt.recording.background import Background
+from brrt.recording.recover import recover
+from brrt.recording.rerun import RerunSink
+
+NAMES = ("run.mcap", "run.rrd")
+ENDLESS = Scenario(world="circles2d", seed=1, smooth=False, iterations=10**9,
+                   params={"goal_bias": 0.0, "step": 0.05})  # fmt: skip
+SMALL = (
+    Scenario(world="circles2d:n=40", seed=7),
+    Scenario(world="boxes3d:n=30", seed=1, planner="bi-rrt"),
+    Scenario(world="circles2d", seed=2, planner="rrt-star", iterations=400),
+)
+PATIENCE_S = 5.0
+LOSS_S, CHUNK = 1.0, 1 << 16
+MEMORY = 6 << 30
+
+
+def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
+    """Record a run in both files as `brrt plan` does; note what was handed over, and when."""
+    run = Run(scenario, batch=batch)
+    world = run.problem.world
+    sinks = [
+        Background(McapSink(folder / NAMES[0], run.manifest, world)),
+        Background(RerunSink(run.manifest, world, path=folder / NAMES[1])),
+    ]
+    handed = os.open(folder / "handed", os.O_WRONLY | os.O_CREAT)
+    count = 0
+    for events in run.events():
+        for sink in sinks:
+            sink.write(events)
+        count += len(events)
+        os.pwrite(handed, f"{count} {events.last.t}\n".encode(), 0)
+    for sink in sinks:
+        sink.close(whole=True)
+    os.close(handed)
+
+
+def nursery() -> None:
+    """Fork a run for each folder that is asked for: to import and compile takes long."""
+    Run(ENDLESS)
+    for line in sys.stdin:
+        child = os.fork()
+        if not child:
+            record(ENDLESS, Path(line.strip()))
+        print(child, flush=True)
+        os.waitpid(child, 0)
+        print("gone", flush=True)
+
+
+def saved(path: Path) -> tuple[Events | None, str | None]:
+    """Return the events that a file gives, and the error that ends them."""
+    batches, dof = [], 0
+    try:
+        recording = read(path)
+        dof = recording.manifest.dof
+        for batch in recording.batches():
+            batches.append(batch)  # noqa: PERF402 - what came before an error counts
+    except BrrtError as error:
+        said = str(error)
+        if not (said.startswith(str(path)) and said.isprintable()):
+            raise AssertionError(f"not one line that names the file: {said!r}") from None
+        return (Events.concat(dof, batches) if dof else None), said
+    return Events.concat(dof, batches), None
+
+
+def command(*args: object) -> tuple[int, str]:
+    """Run `brrt` in this process; return its exit code and what it said."""
+    (script,) = entry_points(group="console_scripts", name="brrt")
+    told = io.StringIO()
+    with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
+        try:
+            script.load()([str(arg) for arg in args])
+        except SystemExit as ended:
+            return int(ended.code or 0), told.getvalue()
+    return 0, told.getvalue()
+
+
+def judge_kill(folder: Path, figures: Counter[str]) -> list[str]:
+    """Say what is wrong with the files that a killed run left."""
+    note = folder / "handed"
+    words = note.read_text().split() if note.exists() else []
+    handed, t = (int(words[0]), int(words[1])) if words else (0, 0)
+    wrong, logs = [], []
+    for name in NAMES:
+        path = folder / name
+        if not path.exists():
+            if handed:
+                wrong.append(f"{name} is not there, though {handed:,} events were handed over")
+            continue
+        events, _ = saved(path)
+        if events is None:
+            wrong.append(f"{name} cannot be read: {saved(path)[1]}")
+            continue
+        logs.append(events)
+        lost = max(0.0, (t - events.last.t) / 1e9)
+        figures[f"{name}: events lost"] += max(0, handed - len(events))
+        figures[f"{name}: most seconds lost, ms"] = max(
+            figures[f"{name}: most seconds lost, ms"], round(1e3 * lost)
+        )
+        if lost > LOSS_S and handed - len(events) > CHUNK:
+            wrong.append(f"{name} lacks the last {lost:.2f} s, {handed - len(events):,} events")
+        wrong += judge_recovery(path, events)
+    if len(logs) == 2:
+        common = min(map(len, logs)) - 1
+        if first_difference([logs[0].until(seq=common)], [logs[1].until(seq=common)]):
+            wrong.append("the two files differ")
+    figures["events handed over"] += handed
+    return wrong
+
+
+def judge_recovery(path: Path, events: Events) -> list[str]:
+    """Recover a file and say what is wrong with the result."""
+    whole = path.with_name(f"whole{path.suffix}")
+    found = recover(path, whole)
+    back, error = saved(whole)
+    wrong = [] if found.events == len(events) else [f"{found.events} of {len(events)} recovered"]
+    if error or back is None or first_difference([events], [back]):
+        wrong.append(f"{whole.name} differs: {error}")
+    if len(events):
+        for args in (("replay", whole), ("verify", whole), ("replay", path, "--partial")):
+            code, told = command(*args)
+            if code:
+                wrong.append(f"brrt {args[0]} {args[1].name}: exit code {code}: {told[-200:]}")
+    if path.suffix == ".mcap":
+        with whole.open("rb") as file:
+            summary = make_reader(file, validate_crcs=True).get_summary()
+        if summary is None or summary.statistics is None:
+            return [*wrong, "stock mcap finds no summary"]
+        if summary.statistics.message_count != len(events):
+            wrong.append("stock mcap counts otherwise")
+    return wrong
+
+
+def kills(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
+    """Kill so many runs; return what is wrong with what they left."""
+    findings = []
+    with Popen(
+        [sys.executable, __file__, "--nursery"], stdin=PIPE, stdout=PIPE, text=True
+    ) as process:
+        orders, answers = cast("IO[str]", process.stdin), cast("IO[str]", process.stdout)
+        for number in range(count):
+            with tempfile.TemporaryDirectory() as name:
+                orders.write(f"{name}\n")
+                orders.flush()
+                child = int(answers.readline())
+                time.sleep(rng.uniform(0, 2.0))
+                os.kill(child, signal.SIGKILL)
+                answers.readline()
+                wrong = judge_kill(Path(name), figures)
+            findings += [f"kill {number}: {line}" for line in wrong]
+        orders.close()
+    return findings
+
+
+def spoiled(data: bytes, rng: random.Random) -> tuple[str, bytes]:
+    """Damage a file in one of the ways that there are; say in which."""
+    way = rng.choice(["flip", "flip", "flip", "cut", "swap", "blank", "double"])
+    at, size = rng.randrange(len(data)), rng.choice([1, 8, 100, 5000])
+    if way == "flip":
+        changed = bytearray(data)
+        for _ in range(rng.choice([1, 1, 1, 20])):
+            changed[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        return way, bytes(changed)
+    if way == "cut":
+        return way, data[:at]
+    part = data[at : at + size]
+    if way == "blank":
+        return way, data[:at] + bytes(len(part)) + data[at + size :]
+    if way == "double":
+        return way, data[: at + size] + part + data[at + size :]
+    to = rng.randrange(len(data))
+    first, second = sorted((at, to))
+    size = min(size, second - first, len(data) - second)
+    a, b = data[first : first + size], data[second : second + size]
+    return way, data[:first] + b + data[first + size : second] + a + data[second + size :]
+
+
+@dataclass
+class Original:
+    """A recording to be spoiled: its name, its bytes, its events and all else that it says."""
+
+    path: Path
+    data: bytes
+    events: Events
+    head: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, path: Path) -> "Original":
+        """Read it."""
+        events, _ = saved(path)
+        if events is None:
+            raise AssertionError(f"{path} gives nothing")
+        return cls(path, path.read_bytes(), events, head(path))
+
+
+def head(path: Path) -> tuple[Any, ...]:
+    """Return what a recording says of its run but for the events."""
+    recording = read(path)
+    return recording.manifest, recording.world.to_json(), recording.result
+
+
+def judge_copy(path: Path, original: Original) -> tuple[str, str | None]:
+    """Read a spoiled copy; say what became of it, and what is wrong with that."""
+    whole, (events, error) = original.events, saved(path)
+    if events is not None:
+        if first_difference([whole.until(seq=len(events) - 1)], [events]):
+            return "wrong", "other events, and nothing said"
+        if any(
+            (table["t"] != whole[kind]["t"][: len(table)]).any()
+            for kind, table in events.tables.items()
+        ):
+            return "wrong", "other times, and nothing said"
+    if error is not None:
+        return "reported", None
+    if events is None or len(events) != len(whole) or head(path) != original.head:
+        return "wrong", "less, or another problem or result, and nothing said"
+    return "harmless", None
+
+
+def originals(folder: Path, rng: random.Random) -> list[Path]:
+    """Record some runs, in small batches; take the end off copies, as a kill does."""
+    found = []
+    for number, scenario in enumerate(SMALL):
+        place = folder / str(number)
+        place.mkdir()
+        record(scenario, place, batch=250)
+        for name in NAMES:
+            data = (place / name).read_bytes()
+            killed = place / f"killed-{name}"
+            killed.write_bytes(data[: int(len(data) * rng.uniform(0.3, 0.9))])
+            found += [place / name, killed]
+    return found
+
+
+def copies(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
+    """Spoil so many copies; return what is wrong with how they read."""
+    findings = []
+    with tempfile.TemporaryDirectory() as name:
+        sources = [Original.of(path) for path in originals(Path(name), rng)]
+        for number in range(count):
+            source = sources[number % len(sources)]
+            way, data = spoiled(source.data, rng)
+            path = Path(name, f"copy{source.path.suffix}")
+            path.write_bytes(data)
+            began = time.perf_counter()
+            try:
+                outcome, wrong = judge_copy(path, source)
+                if number % 10 == 0:
+                    code, told = command("replay", path, "--json")
+                    if code not in (0, 2) or (code == 2 and told.count("\n") != 1):
+                        wrong = f"brrt replay: exit code {code}: {told[-200:]}"
+            except Exception as error:  # noqa: BLE001 - a crash is a finding like any other
+                outcome, wrong = "crash", f"{type(error).__name__}: {error}"
+            took = time.perf_counter() - began
+            if took > PATIENCE_S:
+                wrong = f"{wrong or ''} took {took:.1f} s"
+            figures[f"{path.suffix[1:]}: {outcome}"] += 1
+            figures["slowest copy, ms"] = max(figures["slowest copy, ms"], round(1e3 * took))
+            if wrong:
+                keep = Path(tempfile.gettempdir(), f"fault-{number}{path.suffix}")
+                keep.write_bytes(data)
+                findings.append(f"copy {number} ({way} of {source.path.name}): {wrong}; see {keep}")
+    return findings
+
+
+def main() -> int:
+    """Do both; print figures and findings."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--copies", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--nursery", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.nursery:
+        nursery()
+        return 0
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    findings = []
+    for what, count in ((kills, args.kills), (copies, args.copies)):
+        if not count:
+            continue
+        figures: Counter[str] = Counter()
+        began = time.perf_counter()
+        rng = random.Random(args.seed)  # noqa: S311 - no secret
+        found = what(count, rng, figures)
+        findings += found
+        print(f"{count:,} {what.__name__} in {time.perf_counter() - began:.0f} s")
+        for name, figure in sorted(figures.items()):
+            print(f"  {name}: {figure:,}")
+        print(f"  findings: {len(found)}", flush=True)
+    print("\n".join(findings))
+    return int(bool(findings))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,79 @@
+"""What stands at the end of an MCAP file: figures and counts, read without the events."""
+
+import json
+from collections.abc import Iterator, Mapping
+from io import BytesIO
+from os import SEEK_END
+from pathlib import Path
+from typing import IO, Any
+
+from mcap import records
+from mcap.opcode import Opcode
+
+from brrt.errors import RecordingError
+from brrt.events import Kind
+from brrt.recording.container import MAGIC
+from brrt.recording.mcap_records import FOOTER, check_summary, parsed, records_of
+from brrt.recording.mcap_writer import RESULT
+from brrt.recording.sound import MOST_BYTES
+
+LABELS = {f"/brrt/{kind.label}": kind for kind in Kind}
+"""The topic of each kind of event."""
+
+Result = Mapping[str, Any]
+Counts = Mapping[Kind, int]
+
+
+def ending(path: Path) -> tuple[Result | None, Counts | None]:
+    """Look up the figures and the events of each kind; None for what is not there.
+
+    A file that was cut has no end, and one whose end is damaged none to rely on; their events are
+    still good, as far as they are there.
+    """
+    result, counts, kinds = None, None, dict[int, Kind]()
+    with path.open("rb") as file:
+        try:
+            for opcode, data in _summary(path, file):
+                if opcode == Opcode.CHANNEL:
+                    channel = parsed(path, records.Channel, data)
+                    if channel.topic in LABELS:
+                        kinds[channel.id] = LABELS[channel.topic]
+                elif opcode == Opcode.STATISTICS:
+                    stated = parsed(path, records.Statistics, data).channel_message_counts
+                    counts = {kind: int(stated.get(id_, 0)) for id_, kind in kinds.items()}
+                elif opcode == Opcode.METADATA_INDEX:
+                    index = parsed(path, records.MetadataIndex, data)
+                    if index.name == RESULT and index.length <= MOST_BYTES:
+                        file.seek(index.offset)
+                        result = figures_of(path, file.read(index.length)[9:])
+        except (OSError, OverflowError, RecordingError):
+            return None, None
+    return result, counts
+
+
+def _summary(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and content of each record behind the data; none where that is not whole."""
+    size = file.seek(-FOOTER - len(MAGIC), SEEK_END)
+    start = parsed(path, records.Footer, file.read(FOOTER)[9:]).summary_start
+    if 0 < size - start <= MOST_BYTES:
+        file.seek(start)
+        check_summary(path, file)
+        file.seek(start)
+        rest = BytesIO(file.read(size - start + FOOTER))
+        for opcode, data in records_of(path, rest, check_end=False):
+            if opcode == Opcode.FOOTER:
+                return
+            yield opcode, data
+
+
+def figures_of(path: Path, data: bytes) -> Result:
+    """Read the figures from their record.
+
+    Raises:
+        RecordingError: It is damaged.
+    """
+    texts = parsed(path, records.Metadata, data).metadata
+    try:
+        return {name: json.loads(text) for name, text in texts.items()}
+    except (ValueError, RecursionError):
+        raise RecordingError(f"{path}: damaged: the figures are not JSON") from None

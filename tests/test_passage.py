@@ -1,0 +1,109 @@
+"""The narrowest place on the widest way, against searches that are obvious at a glance."""
+
+import heapq
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from brrt import Grid, World, make_world
+from brrt.worlds.passage import clearance, narrowest
+
+SHAPES = st.sampled_from([(5, 7), (9, 4), (3, 4, 5)])
+FREE = SHAPES.flatmap(lambda shape: arrays(np.bool_, shape))
+
+
+@settings(max_examples=30)
+@given(FREE, st.integers(1, 9))
+def test_clearance_is_the_distance_to_what_is_not_free(free: np.ndarray, farthest: int) -> None:
+    """Every cell against every cell that is not free, those around the lattice too."""
+    cell = np.array([1.0, 1.5, 0.5])[: free.ndim]
+    found = clearance(free, cell, farthest)
+    padded = np.pad(free, 1)
+    taken = np.argwhere(~padded) - 1
+    for index in product(*map(range, free.shape)):
+        apart = (taken - np.array(index)) * cell
+        square = float((apart**2).sum(axis=1).min())
+        most = (farthest * cell.max()) ** 2
+        assert found[index] == pytest.approx(min(square, most))
+
+
+def _widest(square: np.ndarray, start: tuple[int, ...], goal: tuple[int, ...]) -> float:
+    """The greatest least clearance of any way: Dijkstra's algorithm with min for plus."""
+    best, waiting = {start: float(square[start])}, [(-float(square[start]), start)]
+    while waiting:
+        room, at = heapq.heappop(waiting)
+        if at == goal:
+            return -room
+        for axis, step in product(range(square.ndim), (-1, 1)):
+            other = tuple(x + step * (i == axis) for i, x in enumerate(at))
+            if all(0 <= x < n for x, n in zip(other, square.shape, strict=True)):
+                through = min(-room, float(square[other]))
+                if through > max(best.get(other, 0.0), 0.0):
+                    best[other] = through
+                    heapq.heappush(waiting, (-through, other))
+    return 0.0
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10**6))
+def test_the_bottleneck_is_that_of_the_widest_way(seed: int) -> None:
+    """On a grid map, whose cells are the lattice: width, place, and what lies behind it."""
+    rng = np.random.default_rng(seed)
+    free = rng.random((24, 30)) > 0.12
+    grid = Grid(~free, np.zeros(2), 1.0)
+    ends = rng.permutation(np.argwhere(free))[:2]
+    start, goal = (np.array([column + 0.5, row + 0.5]) for row, column in ends)
+    world = World.of_grid("map", grid)
+    found = narrowest(world, start, goal)
+    square = clearance(free.T, np.ones(2), 32)
+    # Ends in a narrow place of their own do not count: from each it is uphill at first.
+    peaks = [_uphill(square, np.floor(end).astype(int)) for end in (start, goal)]
+    least = _widest(square, *peaks)
+    if _widest(square, *(tuple(np.floor(end).astype(int)) for end in (start, goal))) == 0:
+        assert found is None
+        return
+    assert found is not None
+    assert (found.low, found.high) == (2 * np.sqrt(least) - 1, 2 * np.sqrt(least) + 2)
+    at = tuple(np.floor(found.place).astype(int))
+    assert square[at] == least
+    if found.behind.any():
+        assert found.behind[peaks[1]]
+        assert not found.behind[peaks[0]]
+        assert (square[found.behind] > least).all()
+
+
+def _uphill(square: np.ndarray, at: np.ndarray) -> tuple[int, ...]:
+    while True:
+        around = [at + np.array(step) for step in product((-1, 0, 1), repeat=len(at))]
+        inside = [c for c in around if ((c >= 0) & (c < square.shape)).all()]
+        best = max(inside, key=lambda c: square[tuple(c)])
+        if square[tuple(best)] <= square[tuple(at)]:
+            return tuple(at.tolist())
+        at = best
+
+
+@pytest.mark.parametrize("gap", [0.4, 3.7, 12.0])
+@pytest.mark.parametrize("kind", ["gap2d", "passage2d"])
+def test_a_gap_is_as_wide_as_it_was_made(kind: str, gap: float) -> None:
+    """The width is within what is stated, the place in the wall, the goal behind it."""
+    world = make_world(f"{kind}:gap={gap}")
+    assert world.start is not None
+    assert world.goal is not None
+    found = narrowest(world, world.start, world.goal)
+    assert found is not None
+    assert found.low <= gap <= found.high
+    assert found.high - found.low < 5
+    walls = world.boxes
+    assert walls[:, 0].min() - 1 <= found.place[0] <= walls[:, 2].max() + 1
+    assert found.passed(np.array([[90.0, 50.0], [10.0, 50.0]])).tolist() == [True, False]
+
+
+def test_no_way_is_none() -> None:
+    """A goal behind closed walls."""
+    boxes = np.array([[4, 4, 9, 5], [4, 8, 9, 9], [4, 4, 5, 9], [8, 4, 9, 9]], float)
+    world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=boxes)
+    assert narrowest(world, np.array([1.0, 1.0]), np.array([6.5, 6.5])) is None

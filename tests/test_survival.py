@@ -1,0 +1,325 @@
+"""What is left of a recording when something goes wrong while it is written."""
+
+import errno
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rerun as rr
+from mcap.reader import make_reader
+
+from brrt import Events, McapSink, RecordingError, Run, Scenario, first_difference, read
+from brrt.recording import CutError, mcap_writer, rerun
+from brrt.recording.background import Background
+from brrt.recording.drain import Drain
+from brrt.recording.output import Output
+from brrt.recording.recover import NOTE, recover
+from brrt.recording.rerun import RerunSink
+from brrt.recording.rrd_frames import BATCH, FRAME, HEAD, unpacked
+from brrt.recording.stamp import BLANK, WRITTEN
+
+from .conftest import Result, recorded
+
+SCENARIO = Scenario(world="circles2d:n=40", seed=7, clock="logical")
+ENDINGS = (".mcap", ".rrd")
+Command = Callable[..., Result]
+
+
+def new_sink(path: Path, run: Run) -> Any:
+    """Open a sink by the ending of the name."""
+    if path.suffix == ".rrd":
+        return RerunSink(run.manifest, run.problem.world, path=path)
+    return McapSink(path, run.manifest, run.problem.world)
+
+
+def write(path: Path, batch: int = 100) -> Events:
+    """Record a run without gathering its batches; return its log."""
+    run, log = recorded(SCENARIO, batch=batch)
+    sink = new_sink(path, run)
+    for first in range(0, len(log), batch):
+        sink.write(part(log, first, first + batch))
+    sink.close(whole=True)
+    return log
+
+
+def part(log: Events, first: int, end: int) -> Events:
+    """Events from a number on, up to another."""
+    tables = {k: t[(t["seq"] >= first) & (t["seq"] < end)] for k, t in log.tables.items()}
+    return Events(log.dof, {k: t for k, t in tables.items() if len(t)})
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write each batch as it comes, as if each had waited long enough."""
+    monkeypatch.setattr(mcap_writer, "_CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(rerun, "_FILE_S", 0.0)
+
+
+def saved(path: Path) -> tuple[Events, RecordingError | None]:
+    """Return what a file gives, and the error behind it."""
+    recording, batches = read(path), list[Events]()
+    try:
+        batches.extend(recording.batches())
+    except RecordingError as error:
+        return Events.concat(recording.manifest.dof, batches), error
+    return Events.concat(recording.manifest.dof, batches), None
+
+
+def begins(log: Events, events: Events) -> bool:
+    """Whether events are how a log begins, times and all."""
+    beginning = log.until(seq=len(events) - 1)
+    return first_difference([beginning], [events]) is None and all(
+        (table["t"] == events[kind]["t"]).all() for kind, table in beginning.tables.items()
+    )
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_killed_at_any_batch(ending: str, tmp_path: Path) -> None:
+    """What the file holds once a batch was taken is that batch and all before; a name says that."""
+    run, log = recorded(SCENARIO, batch=100)
+    path, left = tmp_path / f"run{ending}", tmp_path / f"left{ending}"
+    sink = new_sink(path, run)
+    for first in range(0, len(log), 100):
+        sink.write(part(log, first, first + 100))
+        left.write_bytes(path.read_bytes())
+        events, error = saved(left)
+        assert isinstance(error, CutError)
+        assert len(events) == min(first + 100, len(log))
+        assert begins(log, events)
+    sink.close(whole=True)
+    assert [p.name for p in tmp_path.iterdir() if p != left] == [path.name]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_older_file_stays_until_there_is_another(ending: str, tmp_path: Path) -> None:
+    """A sink that cannot begin leaves what was there, and nothing else."""
+    path = tmp_path / f"run{ending}"
+    path.write_text("precious")
+    run, _ = recorded(SCENARIO, batch=100)
+    with files_limited_to(100), pytest.raises(RecordingError, match=r"cannot write .*too large"):
+        new_sink(path, run)
+    assert path.read_text() == "precious"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@contextmanager
+def files_limited_to(size: int) -> Iterator[None]:
+    """Let writing fail beyond a size, as a disk does that fills up."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("threaded", [False, True])
+def test_disk_that_fills_up(threaded: bool, tmp_path: Path) -> None:
+    """The file is cut back to its last whole chunk, and nothing comes behind that."""
+    path = tmp_path / "run.mcap"
+    run, log = recorded(SCENARIO, batch=100)
+    sink = new_sink(path, run)
+    with files_limited_to(20_000), pytest.raises(RecordingError, match="File too large"):
+        run_all(Background(sink) if threaded else sink, log)
+    events, error = saved(path)
+    assert isinstance(error, CutError)
+    assert path.stat().st_size < 20_000
+    assert str(error) == f"{path}: the file is cut at byte {path.stat().st_size:,}"
+    assert 0 < len(events) < len(log)
+    assert begins(log, events)
+
+
+def run_all(sink: Any, log: Events) -> None:
+    """Feed a sink and close it, as a run does."""
+    try:
+        for first in range(0, len(log), 100):
+            sink.write(part(log, first, first + 100))
+    except BaseException:
+        sink.close(whole=False)
+        raise
+    sink.close(whole=True)
+
+
+def test_nothing_is_written_behind_a_batch_that_failed() -> None:
+    """Where a thread's sink fails once, the batches behind that one are left out."""
+    _, log = recorded(SCENARIO, batch=100)
+    got = list[int]()
+
+    class Shaky:
+        def write(self, events: Events) -> None:
+            got.append(len(events))
+            if len(got) == 2:
+                raise MemoryError("too much")
+
+        def close(self, *, whole: bool) -> None:
+            assert not whole
+
+    with pytest.raises(MemoryError, match="too much"):
+        run_all(Background(Shaky()), log)
+    assert got == [100, 100]
+
+
+def test_whatever_happens_to_a_drain_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of any kind on its thread ends in one line; its pipe is emptied all the same."""
+
+    def fail(self: Output, data: bytes) -> None:
+        raise MemoryError("too much")
+
+    monkeypatch.setattr(Output, "write", fail)
+    drain = Drain(tmp_path / "x.rrd")
+    with open(drain.inlet, "wb") as inlet:  # noqa: PTH123 - no path
+        inlet.write(bytes(3_000_000))
+    with pytest.raises(RecordingError, match=r"cannot write .*x\.rrd: too much"):
+        drain.settle()
+    with pytest.raises(RecordingError, match="too much"):
+        drain.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_disk_that_fails_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the disk does not keep, though the system took it, is an error at the end."""
+
+    def fail(number: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    path = tmp_path / "run.mcap"
+    run, log = recorded(SCENARIO, batch=100)
+    sink = new_sink(path, run)
+    monkeypatch.setattr("brrt.recording.output.os.fsync", fail)
+    with pytest.raises(RecordingError, match="Input/output error"):
+        run_all(sink, log)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("out", ENDINGS)
+def test_recover(ending: str, out: str, tmp_path: Path) -> None:
+    """What is whole of a cut file, in a file that lacks nothing; cut behind the run, all of it."""
+    path, whole = tmp_path / f"run{ending}", tmp_path / f"whole{out}"
+    log = write(path)
+    data = path.read_bytes()
+    cut = tmp_path / f"cut{ending}"
+    for size in (len(data) * 2 // 5, len(data) - 60):
+        cut.write_bytes(data[:size])
+        expected, _ = saved(cut)
+        found = recover(cut, whole)
+        events, error = saved(whole)
+        assert error is None or (out == ".rrd" and isinstance(error, CutError))
+        assert begins(log, events)
+        assert len(events) == len(expected) == found.events
+        assert found.until_s == expected.last.t / 1e9
+        assert found.lost == f"{cut}: the file is cut at byte {size:,}" + (
+            ", behind the last event" if found.ended and ending == ".mcap" else ""
+        )
+    assert len(events) == len(log)
+    assert read(whole).result == read(path).result is not None
+
+
+def test_recovered_file_says_so(tmp_path: Path) -> None:
+    """Stock mcap finds a whole file, with a note of what it was made of."""
+    path, cut, whole = (tmp_path / f"{name}.mcap" for name in ("run", "cut", "whole"))
+    write(path)
+    data = path.read_bytes()
+    cut.write_bytes(data[: len(data) // 2])
+    found = recover(cut, whole)
+    with whole.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        names = {record.name: record.metadata for record in reader.iter_metadata()}
+        assert sum(1 for _ in reader.iter_messages()) == found.events > 0
+    assert set(names) == {"brrt.run", NOTE}
+    assert names[NOTE]["from"] == "cut.mcap"
+    assert names[NOTE]["events"] == str(found.events)
+    assert names[NOTE]["lost"] == f"cut.mcap: the file is cut at byte {len(data) // 2:,}"
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_recover_what_stands_ahead_of_damage(ending: str, tmp_path: Path) -> None:
+    """Of a file with a wrong byte, the events ahead of it are saved."""
+    path, whole = tmp_path / f"run{ending}", tmp_path / "whole.mcap"
+    log = write(path)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 8
+    path.write_bytes(data)
+    found = recover(path, whole)
+    assert found.lost is not None
+    assert "damaged" in found.lost
+    events, _ = saved(whole)
+    assert 0 < len(events) == found.events < len(log)
+    assert begins(log, events)
+
+
+def test_recover_says_what_it_did(brrt: Command, tmp_path: Path) -> None:
+    """In one line; nothing is written over the recording, nor where there is nothing to save."""
+    log = write(tmp_path / "run.mcap")
+    data = (tmp_path / "run.mcap").read_bytes()
+    for name, size in (("cut", len(data) // 2), ("bare", 1000), ("nearly", len(data) - 9)):
+        (tmp_path / f"{name}.mcap").write_bytes(data[:size])
+    done = brrt("recover", "run.mcap", "--out", "a.mcap")
+    assert done.out.startswith(f"run.mcap is whole: a.mcap holds its {len(log):,} events up to 0.")
+    done = brrt("recover", "nearly.mcap", "--out", "b.mcap")
+    assert f"; b.mcap holds all of the run: {len(log):,} events up to" in done.out
+    done = brrt("recover", "cut.mcap", "--out", "c.mcap")
+    assert "; c.mcap holds what is whole: " in done.out
+    assert done.out.count("\n") == 1
+    assert brrt("verify", "c.mcap").code == 0
+    assert brrt("recover", "cut.mcap", "--out", "c.mcap").code == 2
+    for out, message in (("bare.mcap", "is the recording itself"), ("d.mcap", "nothing to save")):
+        done = brrt("recover", "bare.mcap", "--out", out, "--force")
+        assert (done.code, done.err.count("\n")) == (2, 1)
+        assert message in done.err
+    assert not Path("d.mcap").exists()
+    assert "save them with brrt recover" in brrt("replay", "cut.mcap").err
+
+
+def test_killed_rrd_is_replayed_in_part(brrt: Command, tmp_path: Path) -> None:
+    """As an .mcap is: refused with what can be saved, taken with --partial."""
+    log = write(tmp_path / "run.rrd")
+    data = (tmp_path / "run.rrd").read_bytes()
+    (tmp_path / "cut.rrd").write_bytes(data[: len(data) // 2])
+    refused = brrt("replay", "cut.rrd")
+    assert refused.code == 2
+    assert "replay them with --partial" in refused.err
+    done = brrt("replay", "cut.rrd", "--partial", "--json")
+    assert done.code == 0
+    assert 0 < done.json["events"] < len(log)
+    assert brrt("verify", "cut.rrd", "--partial").code == 0
+
+
+def test_compression_leaves_the_stamp_alone(tmp_path: Path) -> None:
+    """Also beside the texts and lengths with which it took the last letter of the bare blank."""
+    path, taken = tmp_path / "x.rrd", (30, 55, 125, 222, 311, 318, 415, 512)
+    with rr.RecordingStream("x", send_properties=False) as rec:
+        rec.save(path)
+        for text in (BLANK, WRITTEN):
+            for i in taken:
+                result = "a" * (i % 97) + str(i * i)
+                texts = {"events": str(i), "result": result, "stamp": text}
+                value = rr.DynamicArchetype("brrt.end", components=texts)
+                rec.log("/brrt/end", value, static=True)
+                rec.flush()
+        rec.disconnect()
+    data, at, kept = path.read_bytes(), HEAD, list[bool]()
+    while at + FRAME.size <= len(data):
+        kind, length = FRAME.unpack_from(data, at)
+        message = data[at + FRAME.size :][:length]
+        if kind == BATCH and b"/brrt/end" in bytes(unpacked(message)[:2000]):
+            kept.append(BLANK.encode() in message)
+        at += FRAME.size + length
+    assert kept[-len(taken) :] == [True] * len(taken)
+
+
+def test_faults() -> None:
+    """A few kills at full speed and a few spoiled copies; benchmarks/faults.py has thousands."""
+    script = Path(__file__).parents[1] / "benchmarks" / "faults.py"
+    done = subprocess.run(
+        [sys.executable, script, "--kills", "1", "--copies", "36"],
+        capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("findings: 0") == 2
