@@ -14,7 +14,7 @@ import numpy as np
 
 from brrt.events import Events
 from brrt.planners.contract import Contract
-from brrt.replay.checks import draws, growth, lattice, log, moves, paths, rejects, trees
+from brrt.replay.checks import draws, growth, lattice, log, moves, paths, rejects, rewiring, trees
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.tally import Finding, Tally
 from brrt.scenario import Manifest
@@ -23,8 +23,8 @@ from brrt.worlds.world import World
 Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rejects.RULES, *paths.RULES,
-    *moves.RULES, *lattice.RULES,
+    *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
+    *paths.RULES, *moves.RULES, *lattice.RULES,
 )  # fmt: skip
 
 

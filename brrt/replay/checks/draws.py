@@ -89,15 +89,19 @@ def samples(case: Case, tally: Tally) -> Windows:
 
 
 def sources(case: Case, tally: Tally) -> Windows:
-    """Each sample is from a source that the planner may draw from then."""
+    """Each sample is from a source that the planner may draw from then; a path ends some runs."""
     past = _Past()
     while (window := (yield)) is not None:
-        drawn, draws = past.drawn(case, window), case.ruling(window).draws
+        drawn, contract = past.drawn(case, window), case.ruling(window)
+        draws = contract.draws
         if draws is None:
             continue
         source = drawn.table["source"]
         may = _allowed(draws, drawn)
-        wrong = ~np.select([source == s for s in Source], [may[s] for s in Source], default=True)
+        over = np.isfinite(drawn.best) & (contract.stops is True)
+        wrong = over | ~np.select(
+            [source == s for s in Source], [may[s] for s in Source], default=True
+        )
         tally.look(
             drawn.table, np.asarray(wrong),
             lambda i, source=source, best=drawn.best: (  # type: ignore[misc]

@@ -177,7 +177,7 @@ def link_tries(case: Case, tally: Tally) -> Windows:
             if contract.near is None:
                 _look_acts(tally, growth, lines if window is None else followed(lines))
             elif not (window is None and case.cut):
-                _look_meetings(tally, lines)
+                _look_headed(tally, lines)
         if window is None:
             return
 
@@ -223,12 +223,12 @@ def _look_acts(tally: Tally, growth: Growth, lines: Table) -> None:
     )  # fmt: skip
 
 
-def _look_meetings(tally: Tally, lines: Table) -> None:
-    """Where a node has joined a tree, the other one must head for it in the same iteration."""
+def _headed(lines: Table) -> tuple[Ints, Flags, Flags]:
+    """Where iterations begin; whether the tree whose turn it is grew, and the other one headed."""
     sample = lines["kind"] == Kind.SAMPLE
-    if not sample.any():
-        return
     first = np.flatnonzero(sample)
+    if not len(first):
+        return first, np.empty(0, bool), np.empty(0, bool)
     turn = lines["tree"][np.maximum(last_where(sample), 0)]
     edge = lines["kind"] == Kind.EDGE
     moves = edge | (
@@ -237,6 +237,12 @@ def _look_meetings(tally: Tally, lines: Table) -> None:
     )
     grew = np.add.reduceat((edge & (lines["tree"] == turn)).astype(np.int64), first) > 0
     headed = np.add.reduceat((moves & (lines["tree"] != turn)).astype(np.int64), first) > 0
+    return first, grew, headed
+
+
+def _look_headed(tally: Tally, lines: Table) -> None:
+    """Where a node has joined a tree, the other one must head for it in the same iteration."""
+    first, grew, headed = _headed(lines)
     some = lines[first]
     tally.look(
         some, grew != headed,
@@ -247,5 +253,56 @@ def _look_meetings(tally: Tally, lines: Table) -> None:
     )  # fmt: skip
 
 
-RULES = (turns, steering, goal_tries, link_tries)
+def meetings(case: Case, tally: Tally) -> Windows:
+    """Trees are joined at their newest nodes, whenever these are close enough and it is free."""
+    newest = np.zeros(2, script_dtype(case.dof))
+    newest["seq"] = -1
+    while True:
+        window = yield
+        lines, contract = case.scripts.of(window), case.ruling(window)
+        if contract.near is None or contract.growth is None or contract.link is None:
+            lines = lines[:0]
+        if window is None and case.cut and len(lines):
+            lines = lines[: last_where(lines["kind"] == Kind.SAMPLE)[-1]]
+        if len(lines):
+            both = np.concatenate([newest, lines])
+            pair = [_newest(both, k) for k in (0, 1)]
+            _look_met(case, tally, contract.link or 0.0, both, pair)
+            newest = np.stack([both[rows[-1]] for rows in pair])
+        if window is None:
+            return
+
+
+def _newest(lines: Table, tree: int) -> Ints:
+    """For each line the one by which the tree's newest node joined; two are there for a start."""
+    joins = (lines["kind"] == Kind.EDGE) & (lines["tree"] == tree)
+    return np.maximum(last_where(joins), tree)
+
+
+def _look_met(case: Case, tally: Tally, link: float, lines: Table, pair: list[Ints]) -> None:
+    """Hold each iteration's end to the newest nodes as they are then."""
+    first, _, headed = _headed(lines)
+    ends = np.append(first[1:], len(lines))[: len(first)] - 1
+    start, goal = (lines[rows[ends]] for rows in pair)
+    far = case.distance(np.asarray(start["q"]), np.asarray(goal["q"]))
+    due = headed & (far < link * (1 - CLOSE) - case.blur)
+    blocked = (lines["kind"] == Kind.REJECT) & (lines["why"] == Reason.LINK_BLOCKED)
+    met = (lines["kind"] == Kind.CONNECT) | blocked
+    told = np.add.reduceat(met.astype(np.int64), first) > 0 if len(first) else due
+    some = lines[first]
+    tally.look(
+        some, due & ~told,
+        lambda i: f"the newest nodes are {far[i]:.9g} apart, and nobody tries to join them",
+    )  # fmt: skip
+    at = np.flatnonzero(lines["kind"] == Kind.CONNECT)
+    links = lines[at]
+    wrong = links["node"] != lines["node"][pair[0][at]]
+    wrong |= links["parent"] != lines["node"][pair[1][at]]
+    tally.look(
+        links, np.asarray(wrong),
+        lambda i: f"nodes {links['node'][i]} and {links['parent'][i]} are not the newest",
+    )  # fmt: skip
+
+
+RULES = (turns, steering, goal_tries, link_tries, meetings)
 """All rules of this file; see `brrt.replay.checks`."""

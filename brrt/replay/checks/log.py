@@ -7,8 +7,11 @@ from numpy.typing import NDArray
 
 from brrt.events import FIELDS, Events, Kind, Phase, Status, Table
 from brrt.replay.checks.bodies import endless
-from brrt.replay.checks.case import Case, Windows, waypoints
+from brrt.replay.checks.case import CLOSE, Case, Windows, waypoints
 from brrt.replay.checks.tally import Tally
+
+_TICK_S = 1e-3
+"""A real clock is read so often, at least."""
 
 _HEAD = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
 
@@ -120,22 +123,61 @@ def _with_path(case: Case) -> set[Status]:
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
 
 
-def budget(case: Case, tally: Tally) -> None:
-    """No more iterations, draws and attempts to smooth than allowed."""
-    scenario, events = case.manifest.scenario, case.events
-    last, made, begin = case.kept.last_iteration, 0, 0
-    adding = np.unique(events[Kind.EDGE]["iteration"])
-    ends = [*(branch.iteration for branch in case.manifest.branches), last]
+def _made(case: Case) -> int:
+    """Iterations that count."""
+    made, begin = 0, 0
+    adding = np.unique(case.events[Kind.EDGE]["iteration"])
+    ends = [*(branch.iteration for branch in case.manifest.branches), case.kept.last_iteration]
     for end, (_, ruling) in zip(ends, case.manifest.stretches, strict=True):
         # Where failed draws do not count, only those that add a node do.
         sparing = ruling.settings().get("count_failed") is False
         made += int(((begin < adding) & (adding <= end)).sum()) if sparing else end - begin
         begin = end
-    limits = [("iterations", made, scenario.iterations), ("draws", last, scenario.draws)]
-    limits.append(("attempts to smooth", len(events[Kind.SHORTCUT]), scenario.shortcuts))
+    return made
+
+
+def budget(case: Case, tally: Tally) -> None:
+    """No more iterations, draws and attempts to smooth than allowed."""
+    scenario, attempts = case.manifest.scenario, len(case.events[Kind.SHORTCUT])
+    limits = [
+        ("iterations", _made(case), scenario.iterations),
+        ("draws", case.kept.last_iteration, scenario.draws),
+        ("attempts to smooth", attempts, scenario.shortcuts),
+    ]
     for what, count, limit in limits:
         over = limit is not None and count > limit
         tally.one(None, f"{count:,} {what}; {limit:,} are allowed" if over else None)
+
+
+def endings(case: Case, tally: Tally) -> None:
+    """A budget that is said to have ended planning was used up; a path that was to end it did."""
+    phases = case.events[Kind.PHASE]
+    plan = phases[phases["name"] == Phase.PLAN]
+    ends = plan[plan["status"] != Status.BEGIN][-1:]
+    if not case.known or not len(ends):
+        return
+    scenario, wrong = case.manifest.scenario, None
+    if case.outcome is Status.ITERATION_LIMIT:
+        wrong = _left(case)
+    elif case.outcome is Status.TIME_LIMIT:
+        took = int(ends["t"][0] - plan["t"][0]) / 1e9
+        if scenario.time is None:
+            wrong = "planning ended for want of time, but its time was not limited"
+        elif scenario.clock == "real" and took < scenario.time * (1 - CLOSE) - _TICK_S:
+            wrong = f"planning ended after {took:.6f} s; it had {scenario.time:g} s"
+    elif case.outcome is Status.SOLVED and case.contract.stops is False:
+        wrong = "planning ended as solved; it was to go on for a better path"
+    tally.one(ends[0], wrong)
+
+
+def _left(case: Case) -> str | None:
+    """Say what was left of a budget of iterations."""
+    scenario, draws = case.manifest.scenario, case.kept.last_iteration
+    limit, made = scenario.make_stop().iterations, _made(case)
+    spent = scenario.draws is not None and draws >= scenario.draws
+    # Where failed draws do not count, their number has an end all the same.
+    spent |= made < draws and draws >= 1000 * limit
+    return None if made >= limit or spent else f"planning made {made:,} of {limit:,} iterations"
 
 
 def bounds(case: Case, tally: Tally) -> Windows:
@@ -164,5 +206,5 @@ def text(q: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(q).tolist()) + ")"
 
 
-RULES = (numbering, times, phases, names, outcome, budget, bounds)
+RULES = (numbering, times, phases, names, outcome, budget, endings, bounds)
 """All rules of this file; see `brrt.replay.checks`."""
