@@ -21,7 +21,7 @@ from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.5, 0.1
+_GATHERED, _FILE_S, _VIEW_S = 1 << 15, 0.5, 0.1
 """Events that are written together, and for how long one may wait for that: on its way to a file
 alone, and to somebody who is looking."""
 
