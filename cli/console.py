@@ -108,7 +108,8 @@ def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if f["smoothed_path"] is not None:
         saved = 1 - f["smoothed_cost"] / f["path_cost"] if f["path_cost"] else 0.0
         motions = len(f["smoothed_path"]) - 1
-        effort = f"{f['shortcuts']} attempts in {seconds(f['smooth_time_s'])}"
+        took = f["smooth_time_s"]  # None where the log does not say when it began
+        effort = f"{f['shortcuts']} attempts" + ("" if took is None else f" in {seconds(took)}")
         yield (
             "smoothed",
             f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {motions} motions, {effort}",
