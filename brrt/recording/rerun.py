@@ -114,7 +114,7 @@ class RerunSink:
             self._write_texts(END, end)
             if self._view:  # the file is to open at its beginning, though the viewer is at the end
                 self._rec.send_blueprint(self._layout, make_active=False)
-            self._flush()
+            self._hand_on()
         finally:
             self._disconnect()
 
