@@ -97,29 +97,29 @@ def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "run", f"{f['planner']} · {f['robot']} · {f['world']} · seed {f['seed']}"
     yield "outcome", _outcome(f)
     time = "" if f["plan_time_s"] is None else f" in {seconds(f['plan_time_s'])}"
-    yield "planned", f"{f['iterations']:,} iterations{time}"
+    yield "planned", f"{counted(f['iterations'], 'iteration')}{time}"
     yield "events", ": ".join(filter(None, [f"{f['events']:,}", ", ".join(_counts(f))]))
     if f["path"] is not None:
         first = ""
         if f["first_path_cost"] != f["path_cost"]:
             when = f"{f['first_path_cost']:.6g} after {seconds(f['first_path_s'])}"
             first = f" (the first one {when})"
-        yield "path", f"cost {f['path_cost']:.6g}{first}, {len(f['path']) - 1} motions"
+        yield "path", f"cost {f['path_cost']:.6g}{first}, {counted(len(f['path']) - 1, 'motion')}"
     if f["smoothed_path"] is not None:
         saved = 1 - f["smoothed_cost"] / f["path_cost"] if f["path_cost"] else 0.0
-        motions = len(f["smoothed_path"]) - 1
-        effort = f"{f['shortcuts']} attempts in {seconds(f['smooth_time_s'])}"
+        motions = counted(len(f["smoothed_path"]) - 1, "motion")
+        effort = f"{counted(f['shortcuts'], 'attempt')} in {seconds(f['smooth_time_s'])}"
         yield (
             "smoothed",
-            f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {motions} motions, {effort}",
+            f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {motions}, {effort}",
         )
     if f["max_move_time_s"] is not None:
         slowest = f"the slowest planned in {seconds(f['max_move_time_s'])}"
         late = f"{f['deadline_misses']} late" if f["deadline_misses"] else "none late"
-        yield "driven", f"{f['moves']:,} moves, {slowest}, {late}"
+        yield "driven", f"{counted(f['moves'], 'move')}, {slowest}, {late}"
         if f["deadline_misses"]:
-            charged = f"a classic run charges {f['charged_moves']:,} moves"
-            yield "", f"the robot stayed for {f['stays']:,} deadlines; {charged}"
+            charged = f"a classic run charges {counted(f['charged_moves'], 'move')}"
+            yield "", f"the robot stayed for {counted(f['stays'], 'deadline')}; {charged}"
 
 
 def _outcome(f: Mapping[str, Any]) -> str:
@@ -133,13 +133,19 @@ def _outcome(f: Mapping[str, Any]) -> str:
 
 def _counts(f: Mapping[str, Any]) -> Iterator[str]:
     """What a run consists of, as far as there is any of it."""
-    for name, word in (
-        ("samples", "samples"), ("nodes", "nodes"), ("expanded", "cells expanded"),
-        ("learned", "estimates raised"), ("rejects", "rejected"), ("rewires", "rewired"),
-        ("links", "links"),
+    for name, one, several in (
+        ("samples", "sample", None), ("nodes", "node", None),
+        ("expanded", "cell expanded", "cells expanded"),
+        ("learned", "estimate raised", "estimates raised"), ("rejects", "rejected", "rejected"),
+        ("rewires", "rewired", "rewired"), ("links", "link", None),
     ):  # fmt: skip
         if f[name]:
-            yield f"{f[name]:,} {word}"
+            yield counted(f[name], one, several)
+
+
+def counted(number: int, one: str, several: str | None = None) -> str:
+    """Write a number of things: `1 node`, `1,200 nodes`."""
+    return f"{number:,} {one if number == 1 else several or one + 's'}"
 
 
 def seconds(value: float) -> str:

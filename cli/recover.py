@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .console import out
+from .console import counted, out
 
 
 def recover(
@@ -34,7 +34,7 @@ def recover(
 
     check_output(whole, "--out", (".mcap", ".rrd"), force=force)
     found = recover(cut, whole)
-    events = f"{found.events:,} events up to {found.until_s:.6f} s"
+    events = f"{counted(found.events, 'event')} up to {found.until_s:.6f} s"
     if found.lost is None:
         text = f"{cut} is whole: {whole} holds its {events}"
     elif found.ended:

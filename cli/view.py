@@ -120,6 +120,8 @@ def _check(
     if web and screenshot is not None:
         raise BrrtError("give one of --web and --screenshot")
     if web and limits:
+        # Rerun 0.41 takes an instant in an address, `#when=iteration@200`, for what a catalog
+        # server has, and not for a proxy's recording or a file's: tried in Chromium.
         raise BrrtError(
             "the web viewer opens at the start; leave --at out and drag the time slider, or "
             "take a picture of the instant with --screenshot"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from .console import Watch, note, out, print_json, print_pairs, print_rows
+from .console import Watch, counted, note, out, print_json, print_pairs, print_rows
 from .lists import Json, chosen, described, print_described
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def _counts(figures: dict[str, Any]) -> Iterator[str]:
     }
     for key, (one, several) in names.items():
         if figures[key]:
-            yield f"{figures[key]:,} {one if figures[key] == 1 else several}"
+            yield counted(figures[key], one, several)
     grid = figures["grid"]
     if grid is not None:
         turned = f", turned by {grid['yaw']:.4g} rad" if grid["yaw"] else ""

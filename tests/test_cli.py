@@ -35,6 +35,14 @@ def test_plan_writes_both_recordings_and_says_how_to_look(brrt: Command) -> None
     assert "brrt view a.mcap" in brrt("plan", "--out", "a.mcap").out
 
 
+def test_one_of_a_thing_is_no_plural(brrt: Command) -> None:
+    """One iteration, one sample, one motion."""
+    told = brrt("plan", "--world", "empty2d", "--planner", "rrt-connect", "--no-record").out
+    for text in (" 1 iteration in ", ": 1 sample, ", " 1 link ", ", 1 motion, "):
+        assert text in told
+    assert " nodes, " in told
+
+
 def test_replay_prints_what_plan_printed(brrt: Command) -> None:
     """Key for key, from either file, with the real clock."""
     planned = brrt("plan", "--json", "--out", "a.mcap", "--rrd", "a.rrd").json

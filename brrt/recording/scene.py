@@ -150,8 +150,10 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
 def _results(figures: Mapping[str, Any] | None) -> dict[str, str]:
     if figures is None:
         return {}
-    rows = {"status": f"{figures['status']} after {figures['iterations']:,} iterations"}
-    rows["nodes"] = f"{figures['nodes']:,}"
+    plural = "" if figures["iterations"] == 1 else "s"
+    rows = {"status": f"{figures['status']} after {figures['iterations']:,} iteration{plural}"}
+    what = "cells" if figures["expanded"] else "nodes"
+    rows[what] = f"{figures['expanded'] or figures['nodes']:,}"
     if figures["plan_time_s"] is not None:
         rows["planning"] = f"{figures['plan_time_s'] * 1e3:.4g} ms"
     for name, key in (("path", "path_cost"), ("smoothed", "smoothed_cost")):

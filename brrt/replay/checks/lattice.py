@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind, Phase, Stage, Status, Table
 from brrt.planners.contract import Lattice
-from brrt.replay.checks.case import CLOSE, Case, Tally
+from brrt.replay.checks.case import CLOSE, Case
 from brrt.replay.checks.log import text
+from brrt.replay.checks.tally import Tally
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
