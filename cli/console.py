@@ -108,7 +108,9 @@ def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if f["smoothed_path"] is not None:
         saved = 1 - f["smoothed_cost"] / f["path_cost"] if f["path_cost"] else 0.0
         motions = counted(len(f["smoothed_path"]) - 1, "motion")
-        effort = f"{counted(f['shortcuts'], 'attempt')} in {seconds(f['smooth_time_s'])}"
+        effort = counted(f["shortcuts"], "attempt")
+        if f["smooth_time_s"] is not None:  # the log may not say when it began
+            effort += f" in {seconds(f['smooth_time_s'])}"
         yield (
             "smoothed",
             f"cost {f['smoothed_cost']:.6g} ({saved:.1%} less), {motions}, {effort}",

@@ -7,8 +7,8 @@ from .console import print_json, print_pairs, seconds
 
 if TYPE_CHECKING:
     from brrt.replay.cells import CellHistory
-    from brrt.replay.history import NodeHistory, When
     from brrt.replay.moment import Moment
+    from brrt.replay.story import NodeHistory, When
 
 _SHOWN = 5
 """Events of a kind that are listed; of more, the first and the last."""
@@ -39,7 +39,7 @@ def show_node(moment: "Moment", node: int, tree: int, *, as_json: bool) -> None:
     Raises:
         BrrtError: There was no such node.
     """
-    from brrt.replay.history import NodeHistory  # noqa: PLC0415
+    from brrt.replay.story import NodeHistory  # noqa: PLC0415
 
     found = moment.node(node, tree)
     if as_json:

@@ -21,21 +21,21 @@ class Saved:
 
     def __init__(self, recording: "Recording", *, partial: bool, verb: str) -> None:
         self._recording, self._partial, self._verb = recording, partial, verb
-        self.cut = False
+        self.cut, self.events = False, 0
 
     def __iter__(self) -> "Iterator[Events]":
         from brrt.errors import RecordingError  # noqa: PLC0415 - keep --help fast
         from brrt.recording import CutError  # noqa: PLC0415
 
-        events, last = 0, 0
+        self.events, last = 0, 0
         try:
             for batch in self._recording.batches():
-                events += len(batch)
+                self.events += len(batch)
                 last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
                 yield batch
         except CutError as error:
-            verb = "is" if events == 1 else "are"
-            saved = f"{counted(events, 'event')} up to {last / 1e9:.6f} s {verb} whole"
+            verb = "is" if self.events == 1 else "are"
+            saved = f"{counted(self.events, 'event')} up to {last / 1e9:.6f} s {verb} whole"
             if not self._partial:
                 raise RecordingError(
                     f"{error}; {saved}: {self._verb} with --partial, or save them with brrt recover"

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -294,19 +295,26 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("phases", "rrt", lambda c: c.edit(Kind.PHASE, 3, name=77), set()),
     ("phases", "rrt", lambda c: c.drop(Kind.PHASE, 0), set()),
     ("names", "rrt", lambda c: c.edit(Kind.SAMPLE, 3, source=99), set()),
-    ("outcome", "rrt", lambda c: c.edit(Kind.PHASE, 1, status=Status.ITERATION_LIMIT), set()),
+    ("outcome", "rrt", lambda c: c.edit(Kind.PHASE, 1, status=Status.ITERATION_LIMIT),
+     {"endings"}),
     ("outcome", "march", lambda c: c.drop(Kind.PATH, 0), {"moves along path"}),
     ("budget", "rrt", lambda c: c.scenario(iterations=3), set()),
     ("budget", "rrt", lambda c: c.scenario(shortcuts=3), set()),
-    ("bounds", "rrt", lambda c: c.edit(Kind.SAMPLE, 1, q=[-3.0, 5.0]), {"samples"}),
-    ("bounds", "rrt", lambda c: c.edit(Kind.SAMPLE, 1, q=[np.nan, 5.0]), {"samples"}),
+    ("endings", "rrt-star", lambda c: c.edit(Kind.PHASE, 1, status=Status.SOLVED), set()),
+    ("endings", "rrt-star", lambda c: c.edit(Kind.PHASE, 1, status=Status.TIME_LIMIT), set()),
+    ("endings", "rrt-star", lambda c: c.scenario(iterations=2000), set()),
+    ("endings", "rrt-star", lambda c: c.scenario(time=9.0, clock="real").edit(
+        Kind.PHASE, 1, status=Status.TIME_LIMIT), set()),
+    ("bounds", "rrt", lambda c: c.edit(Kind.SAMPLE, 1, q=[-3.0, 5.0]), {"samples", "steering"}),
+    ("bounds", "rrt", lambda c: c.edit(Kind.SAMPLE, 1, q=[np.nan, 5.0]), {"samples", "steering"}),
     ("samples", "rrt", lambda c: c.edit(
-        Kind.SAMPLE, int((c.log[Kind.SAMPLE]["source"] == 1).argmax()), q=[5.0, 5.0]), set()),
+        Kind.SAMPLE, int((c.log[Kind.SAMPLE]["source"] == 1).argmax()), q=[5.0, 5.0]),
+     {"steering"}),
     ("nodes", "rrt", doctored_edge(parent=10**6), set()),
     ("nodes", "rrt", doctored_edge(node=10**6), set()),
     ("roots", "rrt", doctored_edge(parent=-1, cost=0.0), set()),
     ("roots", "star", lambda c: c.edit(Kind.EDGE, 0, parent=0), {"nodes"}),
-    ("edge lengths", "rrt", promise(step=4.9), set()),
+    ("edge lengths", "rrt", promise(step=4.9), {"steering"}),
     ("edge costs", "rrt", dearer_edge, set()),
     ("edges free", "rrt", on_edge, set()),
     ("rewires", "star", lambda c: c.add(Kind.REWIRE, node=leaf(c), parent=leaf(c)), set()),
@@ -359,7 +367,7 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("lattice moves", "walk", lambda c: lattice_of(c, epsilon=5.0), {"choices"}),
     ("choices", "walk", foolish, {"rejections"}),
     ("rejections", "rrt", lambda c: c.edit(
-        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0] + 0.01), set()),
+        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0] + 0.01), {"steering"}),
     ("rejections", "rrt", lambda c: c.edit(Kind.REJECT, 0, node=10**6), set()),
     ("rejections", "a-star", lambda c: c.edit(
         Kind.REJECT, -1, node=0, q=c.log[Kind.EXPAND]["q"][0]), set()),
@@ -386,7 +394,7 @@ BODIES = {
 """Runs of robots with bodies."""
 
 FREE = {"edges free", "paths free", "shortcuts"}
-LENGTHS = {"edge lengths", "edge costs"}
+LENGTHS = {"edge lengths", "edge costs", "steering"}
 
 
 @cache
@@ -444,9 +452,9 @@ DOCTORED_BODIES: list[tuple[str, str, Callable[[Evidence], Evidence], str, set[s
     ("bounds", "endless", posed(None, np.pi), "edge at", FREE | LENGTHS),
     ("bounds", "endless", posed(3.2), "edge at", FREE | LENGTHS),
     ("rejections", "polygon", lambda c: c.edit(
-        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0]), "is clear", set()),
+        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0]), "is clear", {"steering"}),
     ("rejections", "chain", lambda c: c.edit(
-        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0]), "is clear", set()),
+        Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0]), "is clear", {"steering"}),
 ]  # fmt: skip
 
 
@@ -559,8 +567,11 @@ def test_doctored_logs_are_found(
 
 def test_every_rule_has_a_doctored_log() -> None:
     """Whoever adds a rule adds what it is for."""
+    from . import test_draws, test_growing, test_rewiring
+
     names = {rule.__name__.replace("_", " ") for rule in RULES}
-    assert names == {rule for rule, *_ in DOCTORED}
+    others = (test_draws.DOCTORED, test_growing.DOCTORED, test_rewiring.DOCTORED)
+    assert names == {rule for rule, *_ in [*DOCTORED, *chain(*others)]}
     assert all((rule.__doc__ or "").strip() for rule in RULES)
 
 

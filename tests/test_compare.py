@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrt import Comparison, Events, Kind, Manifest, McapSink, Scenario, World, compare, read
+from brrt.scenario import Branch
 
 from .conftest import Result, recorded
 
@@ -130,6 +131,25 @@ def test_defaults_names_and_versions_are_no_difference() -> None:
     assert {row.name for row in found.notes} == {"world", "numpy"}
 
 
+def test_where_a_run_branched_is_a_setting() -> None:
+    """A run that changed its settings on the way is another run."""
+    manifest, world, log = live(SCENARIO)
+    turn = Branch("", "", 100, 300, SCENARIO, seed=4)
+    found = compare((manifest, world, log), (replace(manifest, branches=(turn,)), world, log))
+    assert found.settings == (("branches", "none", "100 with seed 4"),)
+
+
+def test_paths_differ_by_a_waypoint() -> None:
+    """Of two paths the first waypoint that differs is told, and not all of them."""
+    run = live(SCENARIO)
+    waypoints = run[2][Kind.PATH]["waypoints"][0].copy()
+    waypoints[2] += 1
+    told = compare(run, altered(run, Kind.PATH, 0, waypoints=waypoints)).lines()
+    assert any(line.strip().startswith("waypoint 2: (") for line in told)
+    told = compare(run, altered(run, Kind.PATH, 0, waypoints=waypoints[1:])).lines()
+    assert f"waypoints: {len(waypoints)} against {len(waypoints) - 1}" in "\n".join(told)
+
+
 def test_a_world_of_the_same_name_with_other_content() -> None:
     """One circle has moved a little; the name says nothing of it."""
     manifest, world, log = live(SCENARIO)
@@ -157,17 +177,18 @@ def test_reads_no_further_than_needed() -> None:
     assert len(read_so_far) == 2
 
 
-def test_counts_come_from_the_end_of_the_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", [".mcap", ".rrd"])
+def test_counts_come_from_the_end_of_the_file(kind: str, tmp_path: Path) -> None:
     """Counts of all kinds are read without the events; a cut file has none."""
     run = live(SCENARIO)
-    path = filed(run, tmp_path / "run.mcap")
+    path = filed(run, tmp_path / f"run{kind}")
     counts = read(path).counts
     assert counts is not None
     assert {kind: count for kind, count in counts.items() if count} == dict(run[2].counts)
     early = compare(path, live(OTHER))
     assert early.first is not None
     assert early.events[0]["path"] == len(run[2][Kind.PATH])
-    for size in (1, 9, 40, 300):
+    for size in (1, 9, 40, 300) if kind == ".mcap" else (10_000,):
         path.write_bytes(path.read_bytes()[:-size])
         assert read(path).counts is None
         assert read(path).result is None
@@ -185,7 +206,7 @@ def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
     told = brrt("diff", a, b, "--json")
     assert told.code == 1
     assert told.json["first"]["seq"] == 3
-    assert told.json["settings"] == [{"name": "param step", "a": None, "b": 1.5}]
+    assert told.json["settings"] == [{"name": "param step", "a": "auto", "b": 1.5}]
     for kind in told.json["events"].values():
         assert kind["a"] > 0
     missing = brrt("diff", a, "none.mcap")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from brrt import BrrtError, Events, Kind, Metrics, Recording, Scenario, forest, read
 from brrt.events import Reason
 from brrt.replay.cells import CellHistory
-from brrt.replay.history import NodeHistory
+from brrt.replay.story import NodeHistory
 
 from .conftest import Result, recorded
 from .test_replay import cut

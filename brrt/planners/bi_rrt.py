@@ -7,7 +7,7 @@ import numpy as np
 
 from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
 from brrt.planners import _bi_rrt
-from brrt.planners.contract import Contract
+from brrt.planners.contract import Contract, Draws, Growth
 from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
@@ -46,7 +46,14 @@ class BiRRT(TreePlanner):
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
         step = step_length(self.step, problem)
-        return Contract(step=step, link=step)
+        growth = Growth(
+            turn=self.turn,
+            connects=self.grow == "connect",
+            links=self.link,
+            always_links=self.always_link,
+        )
+        draws = Draws(coin=0.5 if self.turn == "coin" else 0.0)
+        return Contract(step=step, link=step, draws=draws, growth=growth, stops=True)
 
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
         """See `TreePlanner.loop`."""

@@ -1,6 +1,7 @@
 """What a planner promises, in figures that a recording can be held to."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,46 @@ class Lattice:
 
 
 @dataclass(frozen=True, slots=True)
+class Draws:
+    """Where samples come from; what is not the goal is drawn evenly from the bounds.
+
+    Attributes:
+        goal_bias: Probability that a draw is of the goal; once there is a path, none is.
+        goal_in_reach: Whether the goal is drawn for certain where the draw before added a node
+            that is within a step of it.
+        coin: Probability that a tree heads for the other's newest node instead of drawing.
+        informed: Whether draws are, once there is a path, from where a better one may lead.
+    """
+
+    goal_bias: float = 0.0
+    goal_in_reach: bool = False
+    coin: float = 0.0
+    informed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """How trees grow: from the node nearest to the sample, by at most a step.
+
+    Attributes:
+        slices: Nodes that each step is cut into.
+        turn: Which of two trees grows: they alternate, the smaller one does, or roles swap unless
+            the coin falls for the other tree's newest node; None where there is one tree.
+        connects: Whether a tree goes on, step by step, until the sample is reached or blocked.
+        links: How the other tree then heads for the newest node: by one step, or on and on.
+        always_links: Whether it does so even where no node was added.
+        goal_test: Whether the goal is tried from each new node that the contract lets join it.
+    """
+
+    slices: int = 1
+    turn: Literal["alternate", "smaller", "coin"] | None = None
+    connects: bool = False
+    links: Literal["extend", "connect"] | None = None
+    always_links: bool = False
+    goal_test: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Contract:
     """What a planner promises beyond what all do; None promises nothing.
 
@@ -58,6 +99,9 @@ class Contract:
         link: Longest link between two trees.
         near: Where parents are chosen and edges rewired.
         lattice: The grid of a search.
+        draws: Where samples come from.
+        growth: How trees grow.
+        stops: Whether the run ends with its first path.
     """
 
     step: float | None = None
@@ -65,3 +109,6 @@ class Contract:
     link: float | None = None
     near: Near | None = None
     lattice: Lattice | None = None
+    draws: Draws | None = None
+    growth: Growth | None = None
+    stops: bool | None = None

@@ -7,7 +7,7 @@ import numpy as np
 
 from brrt.kernels.forest import grown_forest, rooted_forest
 from brrt.planners import _rrt
-from brrt.planners.contract import Contract
+from brrt.planners.contract import Contract, Draws, Growth
 from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
@@ -38,7 +38,13 @@ class RRT(TreePlanner):
 
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
-        return Contract(step=self._step(problem), line_of_sight=self.goal_test == "line-of-sight")
+        return Contract(
+            step=self._step(problem),
+            line_of_sight=self.goal_test == "line-of-sight",
+            draws=Draws(goal_bias=self.goal_bias),
+            growth=Growth(slices=self.slices if self.keep_intermediate else 1, goal_test=True),
+            stops=True,
+        )
 
     def _step(self, problem: Problem) -> float:
         return self.step or 0.05 * problem.world.extent

@@ -9,7 +9,7 @@ import numpy as np
 from brrt.kernels.forest import grown, grown_forest, rooted_forest
 from brrt.planners import _star
 from brrt.planners.bi_rrt import step_length
-from brrt.planners.contract import Contract, Near
+from brrt.planners.contract import Contract, Draws, Growth, Near
 from brrt.planners.drive import Loop, TreePlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
@@ -43,8 +43,17 @@ class StarPlanner(TreePlanner):
     def contract(self, problem: Problem) -> Contract:
         """See `Planner.contract`."""
         options = self.options(problem)
-        near = Near(options.gamma, options.step, problem.dof)
-        return Contract(step=options.step, link=options.link or None, near=near)
+        return Contract(
+            step=options.step,
+            link=options.link or None,
+            near=Near(options.gamma, options.step, problem.dof),
+            draws=Draws(options.goal_bias, not options.link, informed=options.informed),
+            growth=Growth(
+                turn="alternate" if options.link else None,
+                links="extend" if options.link else None,
+            ),
+            stops=options.stop_at_first,
+        )
 
     def open_ended(self) -> Self:
         """See `TreePlanner.open_ended`."""
@@ -75,10 +84,13 @@ class RRTStar(StarPlanner):
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
 
+    def options(self, problem: Problem) -> _star.Options:
+        """See `StarPlanner.options`."""
+        return StarPlanner.options(self, problem)._replace(goal_bias=self.goal_bias)
+
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
         """See `TreePlanner.loop`."""
-        options = self.options(problem)._replace(goal_bias=self.goal_bias)
-        return loop_of(options, problem.start[None], problem, stop)
+        return loop_of(self.options(problem), problem.start[None], problem, stop)
 
 
 def proven_gamma(problem: Problem) -> float:

@@ -15,6 +15,7 @@ from brrt.errors import RecordingError
 from brrt.recording.container import MAGIC
 from brrt.recording.sound import MOST_BYTES, CutError
 
+_BLOCK = 1 << 20
 FOOTER = 29
 """Bytes of the footer's record."""
 
@@ -70,7 +71,7 @@ def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tupl
             raise RecordingError(
                 f"{path}: damaged near byte {file.tell():,}: a record of {length} bytes"
             )
-        data = file.read(length)
+        data = _up_to(file, length)
         if len(data) < length:
             raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
         if opcode == Opcode.DATA_END:
@@ -92,10 +93,21 @@ def check_summary(path: Path, file: IO[bytes]) -> None:
         CutError: It is not all there.
         RecordingError: It is damaged.
     """
-    rest = file.read(MOST_BYTES)
+    rest = _up_to(file, MOST_BYTES)
     if not rest.endswith(MAGIC) or len(rest) < FOOTER + len(MAGIC):
         raise CutError(f"{path}: the file is cut at byte {file.tell():,}, behind the last event")
     # All but the checksum itself, which is the footer's last field.
     body, crc = rest[: -len(MAGIC) - 4], rest[-len(MAGIC) - 4 : -len(MAGIC)]
     if zlib.crc32(body) != struct.unpack("<I", crc)[0]:
         raise RecordingError(f"{path}: damaged: the checksum of the summary differs")
+
+
+def _up_to(file: IO[bytes], size: int) -> bytes:
+    """Read so many bytes or as many as there are; `read` makes room for all of them first."""
+    if size <= _BLOCK:
+        return file.read(size)
+    blocks = []
+    while size > 0 and (block := file.read(min(size, _BLOCK))):
+        blocks.append(block)
+        size -= len(block)
+    return b"".join(blocks)

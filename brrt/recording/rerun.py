@@ -21,7 +21,7 @@ from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-_GATHERED, _FILE_S, _VIEW_S = 1 << 16, 0.5, 0.1
+_GATHERED, _FILE_S, _VIEW_S = 1 << 15, 0.5, 0.1
 """Events that are written together, and for how long one may wait for that: on its way to a file
 alone, and to somebody who is looking."""
 
@@ -108,11 +108,13 @@ class RerunSink:
             end = {"events": str(figures["events"]), "stamp": WRITTEN}
             if whole:
                 end["result"] = json.dumps(figures)
+                counts = self._metrics.counts
+                end["counts"] = json.dumps({kind.label: n for kind, n in counts.items()})
                 self._document(document(self._manifest, figures))
             self._write_texts(END, end)
             if self._view:  # the file is to open at its beginning, though the viewer is at the end
                 self._rec.send_blueprint(self._layout, make_active=False)
-            self._flush()
+            self._hand_on()
         finally:
             self._disconnect()
 

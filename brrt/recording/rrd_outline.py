@@ -19,7 +19,7 @@ from brrt.recording.rrd_frames import (
     unpacked,
 )
 from brrt.recording.sound import MOST_BYTES, CutError, DamagedError
-from brrt.recording.stamp import blanked, is_damaged
+from brrt.recording.stamp import is_damaged
 
 EVENTS, OURS = "/ev/", "/brrt/"
 MANIFEST, WORLD, END, CHECK = "/brrt/manifest", "/brrt/world", "/brrt/end", "/brrt/check"
@@ -115,7 +115,7 @@ class Outline:
                 check = self._look(message, body, _ANY + _TIMES * size)
                 if check is not None:
                     self._hold(check, at, crc)
-            crc, at = zlib.crc32(blanked(message), zlib.crc32(frame, crc)), body + length
+            crc, at = zlib.crc32(message, zlib.crc32(frame, crc)), body + length
         raise CutError(f"{self.path}: the file is cut at byte {size:,}")
 
     def _look(self, message: bytes, at: int, most: int) -> dict[str, str] | None:

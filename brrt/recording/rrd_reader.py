@@ -53,14 +53,19 @@ def read_rerun(path: Path, *, in_parts: bool = False) -> Recording:
     try:
         texts = json.loads(outline.texts[MANIFEST]["json"])
         manifest, world = head(path, dict(texts), outline.texts[WORLD]["json"])
-        result = outline.texts.get(END, {}).get("result")
-        figures = None if result is None else dict(json.loads(result))
+        end = outline.texts.get(END, {})
+        figures = dict(json.loads(end["result"])) if "result" in end else None
+        stated = dict(json.loads(end.get("counts", "{}")))
+        counts = {kind: int(stated[kind.label]) for kind in Kind if kind.label in stated}
     except RecordingError:
         raise
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise RecordingError(f"{path}: damaged: {error!r}") from None
-    shown = None if outline.stopped else figures
-    return Recording(manifest, world, partial(_batches, outline, manifest, figures), shown)
+    batches = partial(_batches, outline, manifest, figures)
+    whole = not outline.stopped
+    return Recording(
+        manifest, world, batches, figures if whole else None, counts if counts and whole else None
+    )
 
 
 def _table(kind: Kind, dof: int, batch: Any) -> Table:

@@ -62,11 +62,6 @@ def is_damaged(path: Path) -> bool:
         return whole != int(found[2], 16)
 
 
-def blanked(data: bytes) -> bytes:
-    """Return a part of a file as it was before the stamp was filled in."""
-    return _STAMP.sub(BLANK.encode(), data)
-
-
 def _find(file: IO[bytes], text: str) -> tuple[int, int]:
     """Return the file's size, and where a text stands last near its end; -1 if it does not."""
     size = file.seek(0, SEEK_END)

@@ -9,7 +9,7 @@ import numpy as np
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Table
 from brrt.replay.account import choice_name
-from brrt.replay.history import When, as_plain
+from brrt.replay.story import When, as_plain
 from brrt.robots import Robot
 from brrt.scenario import Manifest
 

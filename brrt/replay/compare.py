@@ -60,6 +60,7 @@ class Comparison:
         figures: Status and metrics of each; empty where a file has no end.
         timed: Whether the clocks of both were real; otherwise times mean nothing.
         events: Events by kind of each, as far as they are known.
+        tolerance: How far apart numbers may be; see `brrt.replay.diff.Deviation`.
         first: The first event that differs, with the ones ahead of it; None where none does.
     """
 
@@ -69,11 +70,12 @@ class Comparison:
     figures: tuple[Mapping[str, Any], Mapping[str, Any]]
     timed: bool
     events: tuple[Mapping[str, int], Mapping[str, int]]
+    tolerance: float
     first: Difference | None
 
     @property
     def equal(self) -> bool:
-        """Whether the settings are the same and every event is, to the last bit, but the times."""
+        """Whether the settings are the same, and all events but for times and tolerance."""
         return self.first is None and not self.settings
 
     def lines(self) -> list[str]:
@@ -100,6 +102,7 @@ def compare_sides(a: Side, b: Side, tolerance: float = 0.0) -> Comparison:
         (readers[0].figures(), readers[1].figures()),
         all(side.manifest.scenario.clock == "real" for side in (a, b)),
         (readers[0].counts(), readers[1].counts()),
+        tolerance,
         first,
     )
 
@@ -110,14 +113,11 @@ class _Reader:
     def __init__(self, side: Side) -> None:
         self._side = side
         self._metrics = Metrics(side.manifest)
-        self._counts: dict[Kind, int] = {}
         self._ended = False
 
     def __iter__(self) -> Iterator[Events]:
         for batch in self._side.batches:
             self._metrics.write(batch)
-            for kind, count in batch.counts.items():
-                self._counts[kind] = self._counts.get(kind, 0) + count
             yield batch
         self._ended = True
 
@@ -129,6 +129,6 @@ class _Reader:
         """Return how many events of each kind there are, as far as that is known."""
         side, result = self._side, self._side.result or {}
         if self._ended or side.counts is not None:
-            known = self._counts if self._ended else side.counts or {}
+            known = self._metrics.counts if self._ended else side.counts or {}
             return {kind.label: known.get(kind, 0) for kind in Kind}
         return {kind.label: result[name] for name, kind in _COUNTED.items() if name in result}

@@ -15,6 +15,9 @@ Ints = NDArray[np.int64]
 Distance = Callable[[Floats, Floats], Floats]
 """A robot's metric: distances between rows of configurations, shapes (m, dof) to (m,)."""
 
+_AT_ONCE = 1 << 18
+"""Edges that are measured at once."""
+
 SOUND, NO_PARENT, NO_NODE, CIRCLE = range(4)
 """Whether a change could be made: all is well, the new parent does not exist (yet), the rewired
 node does not exist (yet), the new parent descends from the node."""
@@ -66,6 +69,12 @@ def changes(events: Events, tree: int) -> Changes:
     return merged(edges, rewires, 0)
 
 
+def joined(edges: Table) -> Changes:
+    """List what happens to a tree that only grows: its edges, and no copies of them."""
+    nodes = np.arange(len(edges))
+    return Changes(edges["seq"], nodes, edges["parent"], edges["cost"], np.ones(len(nodes), bool))
+
+
 def merged(edges: Table, rewires: Table, first: int) -> Changes:
     """Merge edges and rewires of one tree; its nodes are numbered on from `first`."""
     seq = np.concatenate([edges["seq"], rewires["seq"]])
@@ -86,8 +95,11 @@ def edge_lengths(q: Floats, made: Changes, distance: Distance) -> Floats:
         distance: The robot's metric.
     """
     n, length = len(q), np.full(len(made.seq), np.nan)
-    there = (made.parent >= 0) & (made.parent < n) & (made.node >= 0) & (made.node < n)
-    length[there] = distance(q[made.parent[there]], q[made.node[there]])
+    for first in range(0, len(length), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        node, parent = made.node[some], made.parent[some]
+        there = np.flatnonzero((parent >= 0) & (parent < n) & (node >= 0) & (node < n))
+        length[first + there] = distance(q[parent[there]], q[node[there]])
     return length
 
 
@@ -136,6 +148,30 @@ def fold(made: Changes, length: Floats | None = None, asked: Questions = NONE) -
 def _nothing_yet() -> Ints:
     """Return the place of a fold that has not begun."""
     return np.array([0, 1])
+
+
+def sum_up(made: Changes, length: Floats, asked: Questions = NONE) -> Ledger:
+    """Fold a tree that only grows, see `fold`: no cost changes, so there is less to keep."""
+    nodes = np.arange(len(made.seq))
+    there = (made.parent >= 0) & (made.parent < nodes)
+    parent = np.where(there, made.parent, -1).astype(np.int64)
+    cost = np.array(made.stated, np.float64)
+    _sum_up(parent, length, cost)
+    verdict = np.where(there | (made.parent < 0), SOUND, NO_PARENT).astype(np.uint8)
+    born = np.searchsorted(made.seq, asked.seq, side="right")
+    known = (asked.node >= 0) & (asked.node < born)
+    answers = np.full(len(asked.seq), np.nan)
+    answers[known] = cost[asked.node[known]]
+    parent_cost = np.where(there, cost[parent], np.nan)
+    return Ledger(parent, cost, parent_cost, np.broadcast_to(np.nan, len(nodes)), verdict, answers)
+
+
+@kernel
+def _sum_up(parent: Ints, length: Floats, cost: Floats) -> None:
+    """Make each cost the parent's and the length; of what has no parent it stays."""
+    for i in range(len(parent)):
+        if parent[i] >= 0:
+            cost[i] = cost[parent[i]] + length[i]
 
 
 class Standing:

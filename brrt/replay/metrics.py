@@ -1,6 +1,7 @@
 """The figures of a run: one fold over its events, live or from a file."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,11 @@ class Metrics:
     def best_path(self) -> Path | None:
         """The path that stands: the smoothed one, or else the last that the planner found."""
         return self._smoothed or self._raw
+
+    @property
+    def counts(self) -> Mapping[Kind, int]:
+        """Events of each kind, of those that do not occur as well."""
+        return self._counts
 
     @property
     def iterations(self) -> int:

@@ -58,13 +58,18 @@ def _rows(title: str, rows: tuple[Row, ...], none: str) -> Iterator[str]:
 def _outcome(found: Comparison) -> Iterator[str]:
     """Tell how the runs ended, and their figures."""
     a, b = found.figures
-    yield _row("outcome", _status(a), _status(b))
+    yield _row("outcome", _outcome_of(a), _outcome_of(b))
+    ends = [each.get("status", "solved") for each in (a, b)]
+    if ends != ["solved", "solved"]:
+        yield _row("  ended by", *ends)
     names = METRICS + TIMES if found.timed else METRICS
     for name in names:
         x, y = a.get(name), b.get(name)
         if x is not None or y is not None:
-            p, q = _apart(x, y)
-            yield _row("  " + name.replace("_", " "), p, q, _change(x, y))
+            in_time = name in TIMES
+            p, q = (_seconds(x), _seconds(y)) if in_time else _apart(x, y)
+            said = name.removesuffix("_s").replace("_", " ")
+            yield _row(f"  {said}", p, q, _change(x, y))
 
 
 def _events(found: Comparison) -> Iterator[str]:
@@ -86,8 +91,9 @@ def _parting(found: Comparison) -> Iterator[str]:
     """Tell where they part, and how to look at it."""
     first = found.first
     if first is None:
+        how = f"numbers within {found.tolerance:g}" if found.tolerance else "to the last bit"
         but = "; the settings alone differ" if found.settings else ""
-        yield f"The events are equal, every one to the last bit but the times{but}."
+        yield f"The events are equal, {how}, but for the times{but}."
         return
     yield from parting(first, ("A", "B"))
     if all(found.names):
@@ -113,8 +119,17 @@ def parting(first: Difference, names: tuple[str, str]) -> Iterator[str]:
         text = "the run has ended" if theirs is None else _event(theirs, marked)
         yield _fit(f"{name:{margin}} {seq:>{digits},}  {text}")
     for name in marked:
-        values = _apart(*((theirs or {})[name] for theirs in (first.left, first.right)))
-        yield _fit(f"{'':{margin}} {'':{digits}}  {name}: {' against '.join(values)}")
+        values = [(theirs or {})[name] for theirs in (first.left, first.right)]
+        where, (a, b) = _unlike(*values) if name == "waypoints" else (name, values)
+        yield _fit(f"{'':{margin}} {'':{digits}}  {where}: {' against '.join(_apart(a, b))}")
+
+
+def _unlike(a: Any, b: Any) -> tuple[str, tuple[Any, Any]]:
+    """Return the first waypoint that is another in two paths, or how many they have."""
+    if len(a) != len(b):
+        return "waypoints", (len(a), len(b))
+    at = next(i for i, (p, q) in enumerate(zip(a, b, strict=True)) if not same(p, q))
+    return f"waypoint {at}", (a[at], b[at])
 
 
 def _event(event: Mapping[str, Any], marked: Collection[str] = ()) -> str:
@@ -123,7 +138,7 @@ def _event(event: Mapping[str, Any], marked: Collection[str] = ()) -> str:
     for name, value in event.items():
         if name not in ("seq", "kind"):
             short = {"iteration": "it"}.get(name, name)
-            parts.append(f"{'*' if name in marked else ''}{short} {_text(value)}")
+            parts.append(f"{'*' if name in marked else ''}{short} {_text(value, 5)}")
     return " ".join(parts)
 
 
@@ -136,11 +151,19 @@ def _fit(line: str) -> str:
     return line if len(line) <= WIDTH else line[: WIDTH - 4] + " ..."
 
 
-def _status(figures: Mapping[str, Any]) -> str:
+def _outcome_of(figures: Mapping[str, Any]) -> str:
     if not figures:
         return "cut: no result"
-    status = str(figures["status"])
-    return status if not figures["solved"] or status == "solved" else f"solved; {status}"
+    return "solved" if figures["solved"] else "not solved"
+
+
+def _seconds(value: float | None) -> str:
+    if value is None:
+        return "none"
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value * 1e6:.3g} us"
 
 
 def _count(value: int | None) -> str:
@@ -167,13 +190,13 @@ def _apart(a: Any, b: Any) -> tuple[str, str]:
 
 def _text(value: Any, digits: int = 6) -> str:
     if value is None:
-        return "auto"
+        return "none"
     if isinstance(value, bool | np.bool_):
         return str(bool(value)).lower()
     if isinstance(value, float | np.floating):
         return f"{float(value):.{digits}g}"
-    if isinstance(value, np.ndarray) and value.ndim > 1 and digits < 17:
-        return f"{len(value)} waypoints"
+    if isinstance(value, np.ndarray) and value.ndim > 1:
+        return str(len(value))
     if isinstance(value, list | tuple | np.ndarray):
         return "(" + ", ".join(_text(x, digits) for x in np.ravel(np.asarray(value)).tolist()) + ")"
     return f"{value:,}" if isinstance(value, int | np.integer) else str(value)

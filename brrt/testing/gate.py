@@ -159,7 +159,7 @@ def judge(
         _judge(figure, margin, [(old.runs[n], new.runs[n]) for n in found], found, share)
         for figure, margin in margins.items()
     ]
-    _check_solved(judged[0], margins, alpha)
+    _check_solved(judged[0], len(seeds), margins, alpha)
     identical = all(a[figure] == b[figure] for a, b in pairs for figure in a.keys() & b.keys())
     return Verdict(name, len(seeds), alpha, identical, tuple(judged))
 
@@ -227,12 +227,17 @@ def _least(margins: Mapping[str, Any], alpha: float) -> int:
     return math.ceil(math.log2((len(margins) + 1) / alpha))
 
 
-def _check_solved(solved: Judged, margins: Mapping[str, Any], alpha: float) -> None:
+def _check_solved(old: Judged, seeds: int, margins: Mapping[str, Any], alpha: float) -> None:
+    """Refuse where too few pairs are to be expected in which both find a path, were all as before.
+
+    Raises:
+        BrrtError: They are too few.
+    """
     least = _least(margins, alpha)
-    if margins and solved.old < least:
+    if margins and old.old**2 < least * seeds:
         raise BrrtError(
-            f"the old runs found {solved.old:.0f} paths, and it takes {least} to prove anything of "
-            f"{', '.join(margins)}; give more seeds or a larger budget"
+            f"the old runs found a path with {old.old:.0f} of {seeds} seeds: too few pairs to "
+            f"prove anything of {', '.join(margins)}; give more seeds or a larger budget"
         )
 
 

@@ -1,35 +1,44 @@
 """What a recording proves: every promise is a rule, and every rule a function over the events.
 
-A rule takes a `Case` and a `Tally`: it looks at the case and tells the tally what it saw. Its name
-and the first line of its docstring are what people read. To add one, write it and put it into
-`RULES` at the end of its file.
+A rule takes a `Case` and a `Tally`: it looks at the case and tells the tally what it saw. One that
+yields is sent the events in windows, as they are read, and then None; one that does not looks at
+what was kept of them. Its name and the first line of its docstring are what people read. To add
+one, write it and put it into `RULES` at the end of its file.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from inspect import isgeneratorfunction
+from itertools import chain, pairwise
 
 import numpy as np
 
 from brrt.events import Events
 from brrt.planners.contract import Contract
-from brrt.replay.checks import lattice, log, moves, paths, rejects, trees
-from brrt.replay.checks.case import Case, Finding, Tally
+from brrt.replay.checks import draws, growth, lattice, log, moves, paths, rejects, rewiring, trees
+from brrt.replay.checks.case import Case, Windows
+from brrt.replay.checks.tally import Finding, Tally
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
-Rule = Callable[[Case, Tally], None]
+Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *trees.RULES, *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES,
+    *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
+    *paths.RULES, *moves.RULES, *lattice.RULES,
 )  # fmt: skip
+
+
+_WINDOW = 100_000
+"""Events that rules look at together, at least, while a log is read."""
 
 
 def examine(
     manifest: Manifest,
     world: World,
-    events: Events,
+    events: Events | Iterable[Events],
     contract: Contract | None = None,
     *,
-    cut: bool = False,
+    cut: bool | Callable[[], bool] = False,
 ) -> list[Tally]:
     """Hold a run to all rules; return for each what it looked at and what it found.
 
@@ -38,28 +47,72 @@ def examine(
     Args:
         manifest: The run's.
         world: The run's.
-        events: The whole log.
+        events: The whole log, at once or in batches, in order.
         contract: What the planner promises; by default what the registered one of that name does,
             and of one that is not known here only what all planners do.
-        cut: Whether the log breaks off; what is promised of the end is then left out.
+        cut: Whether the log breaks off, or what says so once it was read; what is promised of the
+            end is then left out.
 
     Raises:
         BrrtError: The manifest's query is of no use in its world.
     """
-    case = Case.of(manifest, world, events, contract, cut=cut)
-    tallies = []
+    case = Case.of(manifest, world, contract, cut if callable(cut) else lambda: bool(cut))
+    firsts = [first for first, _ in case.stretches[1:]]
+    tallies, looking = [], []
     # A doctored log may hold anything, so arithmetic on it may overflow; that is no news.
     with np.errstate(all="ignore"):
         for rule in RULES:
             promise = (rule.__doc__ or "").partition("\n")[0]
-            tally = Tally(rule.__name__.replace("_", " "), promise)
-            rule(case, tally)
-            tallies.append(tally)
+            tallies.append(Tally(rule.__name__.replace("_", " "), promise))
+            looking.append(rule(case, tallies[-1]) if isgeneratorfunction(rule) else None)
+        for window in chain([None], _windows(events, firsts)):
+            if window is not None:
+                case.kept.take(window)
+            for look in looking:
+                if look is not None:
+                    look.send(window)
+        for rule, look, tally in zip(RULES, looking, tallies, strict=True):
+            if look is None:
+                rule(case, tally)
+            else:
+                next(look, None)
     return tallies
 
 
+def _windows(events: Events | Iterable[Events], firsts: list[int]) -> Iterator[Events]:
+    """Yield batches that are large enough to be worth the while, and none without an event.
+
+    Args:
+        events: The log.
+        firsts: Events that begin a window in any case, in order.
+    """
+    some: list[Events] = []
+    for batch in [events] if isinstance(events, Events) else events:
+        some.append(batch)
+        if sum(map(len, some)) >= _WINDOW:
+            yield from _parts(Events.concat(batch.dof, some), firsts)
+            some = []
+    if sum(map(len, some)):
+        yield from _parts(Events.concat(some[0].dof, some) if len(some) > 1 else some[0], firsts)
+
+
+def _parts(window: Events, firsts: list[int]) -> Iterator[Events]:
+    """Part a window ahead of events of these numbers."""
+    for low, high in pairwise([-np.inf, *firsts, np.inf]) if firsts else [(-np.inf, np.inf)]:
+        tables = {
+            kind: table if not firsts else table[(low <= table["seq"]) & (table["seq"] < high)]
+            for kind, table in window.tables.items()
+        }
+        part = Events(window.dof, {kind: table for kind, table in tables.items() if len(table)})
+        if len(part):
+            yield part
+
+
 def check(
-    manifest: Manifest, world: World, events: Events, contract: Contract | None = None
+    manifest: Manifest,
+    world: World,
+    events: Events | Iterable[Events],
+    contract: Contract | None = None,
 ) -> list[Finding]:
     """Return the promises that a run breaks, in the order of its events; of each rule the first.
 

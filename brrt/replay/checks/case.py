@@ -1,7 +1,7 @@
-"""What rules look at, and how they say what they found."""
+"""What rules look at."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -11,8 +11,21 @@ from numpy.typing import NDArray
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.planners import PLANNERS
 from brrt.planners.contract import Contract
+from brrt.replay.checks.keeping import Kept
 from brrt.replay.checks.motions import Obstacles, first_hits
-from brrt.replay.ledger import Changes, Ledger, changes, edge_lengths, fold
+from brrt.replay.checks.script import Scripts
+from brrt.replay.checks.tally import Tally
+from brrt.replay.ledger import (
+    NONE,
+    Changes,
+    Ledger,
+    Questions,
+    edge_lengths,
+    fold,
+    joined,
+    merged,
+    sum_up,
+)
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
@@ -24,68 +37,26 @@ CLOSE = 1e-9
 ROUNDING = 1e-14
 """The same, as a part of the coordinates: a short motion far from the origin is rounded most."""
 
-_SHOWN = 20
+_AT_ONCE = 1 << 18
+
+Windows = Generator[None, Events | None]
+"""A rule that looks at events as they are read: it is sent window after window, then None."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A promise that an event breaks.
-
-    Attributes:
-        rule: Name of the rule.
-        seq: The event's number; -1 where the whole log is meant.
-        t: Its time in ns.
-        message: What is wrong with it.
-    """
-
-    rule: str
-    seq: int
-    t: int
-    message: str
+def waypoints(event: Any, dof: int) -> Floats:
+    """A path's configurations, shape (n, dof)."""
+    return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
 
 
-@dataclass(slots=True)
-class Tally:
-    """What a rule looked at; of many findings the first are kept, all are counted.
+def _of_tree(table: Table, tree: int) -> Table:
+    """Return the rows of one tree; where they are all, the table itself and no copy."""
+    mine = table["tree"] == tree
+    return table if mine.all() else table[mine]
 
-    Attributes:
-        rule: Name of the rule.
-        promise: What it holds a run to.
-        examined: Things looked at.
-        broken: Things that break the promise.
-        findings: The first of those.
-    """
 
-    rule: str
-    promise: str
-    examined: int = 0
-    broken: int = 0
-    findings: list[Finding] = field(default_factory=list)
-
-    def look(self, table: Table, wrong: NDArray[np.bool_], say: Callable[[int], str]) -> None:
-        """Take in rows of a table.
-
-        Args:
-            table: Events, shape (n,).
-            wrong: Which of them break the promise, shape (n,).
-            say: What is wrong with the row of that number.
-        """
-        self.examined += len(table)
-        at = np.flatnonzero(wrong)
-        self.broken += len(at)
-        for i in at[: _SHOWN - len(self.findings)].tolist():
-            row = table[i]
-            self.findings.append(Finding(self.rule, int(row["seq"]), int(row["t"]), say(i)))
-
-    def one(self, event: Any, message: str | None) -> None:
-        """Take in one event, or None for the log as a whole; no message where all is well."""
-        self.examined += 1
-        if message is None:
-            return
-        self.broken += 1
-        if len(self.findings) < _SHOWN:
-            seq, t = (-1, 0) if event is None else (int(event["seq"]), int(event["t"]))
-            self.findings.append(Finding(self.rule, seq, t, message))
+def folded(made: Changes, length: Floats, asked: Questions = NONE) -> Ledger:
+    """Fold a tree, as `fold` does, with less to keep where nothing is rewired."""
+    return sum_up(made, length, asked) if made.joins.all() else fold(made, length, asked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +81,16 @@ class Grown:
 
     def of_edges(self, column: NDArray[Any]) -> NDArray[Any]:
         """The part of a column of changes that belongs to the edges."""
-        return column[self.made.joins]
+        return column[self.made.joins] if len(self.rewires) else column
 
     def of_rewires(self, column: NDArray[Any]) -> NDArray[Any]:
         """The part that belongs to the rewires."""
-        return column[~self.made.joins]
+        return column[~self.made.joins] if len(self.rewires) else column[:0]
+
+    def spans(self) -> Iterator[slice]:
+        """Yield the edges in parts: of millions not all can be looked at at once."""
+        for first in range(0, len(self.edges), _AT_ONCE):
+            yield slice(first, min(first + _AT_ONCE, len(self.edges)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +100,7 @@ class Case:
     Attributes:
         manifest: The run's.
         world: The run's.
-        events: The whole log.
+        kept: What is kept of the log, which is read in windows.
         robot: What moves.
         start: First configuration, shape (dof,).
         goal: Last configuration, shape (dof,).
@@ -134,12 +110,12 @@ class Case:
         stretches: The number of the event that each contract rules from, and the contract: more
             than one where a run went on from a recorded one with other settings.
         known: Whether the planner is known here, so that there is a contract.
-        cut: Whether the log breaks off.
+        breaks_off: Says, once the log was read, whether it breaks off.
     """
 
     manifest: Manifest
     world: World
-    events: Events
+    kept: Kept
     robot: Any
     start: Floats
     goal: Floats
@@ -148,26 +124,23 @@ class Case:
     contract: Contract
     stretches: tuple[tuple[int, Contract], ...]
     known: bool
-    cut: bool = False
+    breaks_off: Callable[[], bool]
 
     @classmethod
     def of(
         cls,
         manifest: Manifest,
         world: World,
-        events: Events,
         contract: Contract | None = None,
-        *,
-        cut: bool = False,
+        breaks_off: Callable[[], bool] = lambda: False,
     ) -> Self:
         """Open the case of a recording.
 
         Args:
             manifest: The run's.
             world: The run's.
-            events: The whole log.
             contract: What the planner promises; by default what the registered one does.
-            cut: Whether the log breaks off.
+            breaks_off: Says, once the log was read, whether it breaks off.
 
         Raises:
             BrrtError: Its query is of no use in its world.
@@ -183,14 +156,41 @@ class Case:
             )
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
-            manifest, world, events, problem.robot, problem.start, problem.goal, *bounds,
-            stretches[-1][1], stretches, known, cut,
+            manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
+            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off,
         )  # fmt: skip
+
+    @cached_property
+    def scripts(self) -> Scripts:
+        """The log's events in one table, iteration by iteration, for rules that read it so."""
+        return Scripts(self.dof, {first for first, _ in self.stretches})
+
+    @cached_property
+    def events(self) -> Events:
+        """What is kept of the log; there once the last window was read."""
+        return self.kept.events()
+
+    @property
+    def cut(self) -> bool:
+        """Whether the log breaks off; known once the last window was read."""
+        return self.breaks_off()
+
+    @property
+    def dof(self) -> int:
+        """Numbers in a configuration."""
+        return self.manifest.dof
 
     def stretch(self, table: Table) -> NDArray[np.int64]:
         """Return which of the `stretches` each event belongs to, shape (n,)."""
         firsts = [first for first, _ in self.stretches]
         return np.maximum(np.searchsorted(firsts, table["seq"], side="right") - 1, 0)
+
+    def ruling(self, window: Events | None) -> Contract:
+        """Return the contract that rules a window, which ends where another one begins to rule."""
+        heads = [table[:1] for table in window.tables.values()] if window is not None else []
+        if not heads:
+            return self.contract
+        return self.stretches[min(int(self.stretch(head)[0]) for head in heads if len(head))][1]
 
     def limits(self, table: Table, figure: Callable[[Contract], float | None]) -> Floats:
         """Return a limit that each event is held to, infinite where there is none, shape (n,)."""
@@ -241,22 +241,16 @@ class Case:
         return [self._grown(number) for number in sorted(numbers)]
 
     def _grown(self, number: int) -> Grown:
-        edges, rewires = (
-            table[table["tree"] == number]
-            for table in (self.events[Kind.EDGE], self.events[Kind.REWIRE])
-        )
-        made = changes(self.events, number)
+        edges, rewires = (_of_tree(self.events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
+        made = merged(edges, rewires, 0) if len(rewires) else joined(edges)
         length = edge_lengths(np.asarray(edges["q"]), made, self.distance)
-        return Grown(number, edges, rewires, made, length, fold(made, length))
+        ledger = folded(made, length)
+        return Grown(number, edges, rewires, made, length, ledger)
 
     @cached_property
     def paths(self) -> list[tuple[Any, Floats]]:
         """Each path's event, and its waypoints, shape (n, dof)."""
-        dof = self.events.dof
-        return [
-            (event, np.asarray(event["waypoints"], np.float64).reshape(-1, dof))
-            for event in self.events[Kind.PATH]
-        ]
+        return [(event, waypoints(event, self.dof)) for event in self.events[Kind.PATH]]
 
     @property
     def found(self) -> list[tuple[Any, Floats]]:

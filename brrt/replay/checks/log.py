@@ -5,9 +5,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Kind, Phase, Source, Status, Table
+from brrt.events import FIELDS, Events, Kind, Phase, Status, Table
 from brrt.replay.checks.bodies import endless
-from brrt.replay.checks.case import Case, Tally
+from brrt.replay.checks.case import CLOSE, Case, Windows, waypoints
+from brrt.replay.checks.tally import Tally
+
+_TICK_S = 1e-3
+"""A real clock is read so often, at least."""
 
 _HEAD = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
 
@@ -23,29 +27,38 @@ def heads(events: Events) -> Table:
     return heads[np.argsort(heads["seq"], kind="stable")]
 
 
-def numbering(case: Case, tally: Tally) -> None:
+def numbering(case: Case, tally: Tally) -> Windows:  # noqa: ARG001 - every rule takes both
     """Events are numbered 0, 1, 2 ..."""
-    log = heads(case.events)
-    steps = np.diff(log["seq"], prepend=-1)
-    tally.look(log, steps != 1, lambda i: f"event {log['seq'][i]} is number {i} of the log")
+    last, count = -1, 0
+    while (window := (yield)) is not None:
+        log = heads(window)
+        steps = np.diff(log["seq"], prepend=last)
+        tally.look(
+            log, steps != 1,
+            lambda i, log=log, n=count: f"event {log['seq'][i]} is number {n + i} of the log",  # type: ignore[misc]
+        )  # fmt: skip
+        last, count = int(log["seq"][-1]), count + len(log)
 
 
-def times(case: Case, tally: Tally) -> None:
+def times(case: Case, tally: Tally) -> Windows:  # noqa: ARG001 - every rule takes both
     """Time rises from event to event, and no time is below 0; iterations never fall."""
-    log = heads(case.events)
-    wrong = np.diff(log["t"], prepend=-1) <= 0
-    tally.look(
-        log, wrong, lambda i: f"time {log['t'][i]} ns does not follow {_before(log, 't', i)}"
-    )
-    back = np.diff(log["iteration"], prepend=0) < 0
-    tally.look(
-        log[back], np.ones(int(back.sum()), bool),
-        lambda i: f"iteration {log['iteration'][back][i]} follows a greater one",
-    )  # fmt: skip
-
-
-def _before(log: Table, name: str, i: int) -> str:
-    return "the beginning" if i == 0 else f"{log[name][i - 1]}"
+    t, iteration = -1, 0
+    while (window := (yield)) is not None:
+        log = heads(window)
+        before = np.concatenate([[t], log["t"][:-1]])
+        tally.look(
+            log, log["t"] <= before,
+            lambda i, log=log, b=before: (  # type: ignore[misc]
+                f"time {log['t'][i]} ns does not follow "
+                + ("the beginning" if b[i] < 0 else f"{b[i]}")
+            ),
+        )  # fmt: skip
+        back = log[np.diff(log["iteration"], prepend=iteration) < 0]
+        tally.look(
+            back, np.ones(len(back), bool),
+            lambda i, b=back: f"iteration {b['iteration'][i]} follows a greater one",  # type: ignore[misc]
+        )  # fmt: skip
+        t, iteration = int(log["t"][-1]), int(log["iteration"][-1])
 
 
 def phases(case: Case, tally: Tally) -> None:
@@ -73,16 +86,17 @@ def _phase(number: int) -> str:
     return f"phase {Phase(number).name.lower() if number in set(Phase) else number}"
 
 
-def names(case: Case, tally: Tally) -> None:
+def names(case: Case, tally: Tally) -> Windows:  # noqa: ARG001 - every rule takes both
     """Sources, reasons and stages are among those that there are."""
-    for kind, fields in FIELDS.items():
-        for field in fields:
-            table, choices = case.events[kind], field.choices
-            if choices is None or not len(table) or kind is Kind.PHASE:
-                continue
-            values, name = table[field.name], field.name
-            wrong = ~np.isin(values, [int(choice) for choice in choices])
-            tally.look(table, np.asarray(wrong), _naming(name, values))
+    while (window := (yield)) is not None:
+        for kind, fields in FIELDS.items():
+            for field in fields:
+                table, choices = window[kind], field.choices
+                if choices is None or not len(table) or kind is Kind.PHASE:
+                    continue
+                values, name = table[field.name], field.name
+                wrong = ~np.isin(values, [int(choice) for choice in choices])
+                tally.look(table, np.asarray(wrong), _naming(name, values))
 
 
 def _naming(name: str, values: NDArray[np.uint8]) -> Callable[[int], str]:
@@ -109,51 +123,83 @@ def _with_path(case: Case) -> set[Status]:
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
 
 
-def budget(case: Case, tally: Tally) -> None:
-    """No more iterations, draws and attempts to smooth than allowed."""
-    scenario, events = case.manifest.scenario, case.events
-    last = max((int(t["iteration"].max()) for t in events.tables.values() if len(t)), default=0)
+def _made(case: Case) -> int:
+    """Iterations that count."""
     made, begin = 0, 0
-    adding = np.unique(events[Kind.EDGE]["iteration"])
-    ends = [*(branch.iteration for branch in case.manifest.branches), last]
+    joins = case.events[Kind.EDGE]["iteration"]
+    adding = joins[np.diff(joins, prepend=-1) != 0]
+    ends = [*(branch.iteration for branch in case.manifest.branches), case.kept.last_iteration]
     for end, (_, ruling) in zip(ends, case.manifest.stretches, strict=True):
         # Where failed draws do not count, only those that add a node do.
         sparing = ruling.settings().get("count_failed") is False
         made += int(((begin < adding) & (adding <= end)).sum()) if sparing else end - begin
         begin = end
-    limits = [("iterations", made, scenario.iterations), ("draws", last, scenario.draws)]
-    limits.append(("attempts to smooth", len(events[Kind.SHORTCUT]), scenario.shortcuts))
+    return made
+
+
+def budget(case: Case, tally: Tally) -> None:
+    """No more iterations, draws and attempts to smooth than allowed."""
+    scenario, attempts = case.manifest.scenario, len(case.events[Kind.SHORTCUT])
+    limits = [
+        ("iterations", _made(case), scenario.iterations),
+        ("draws", case.kept.last_iteration, scenario.draws),
+        ("attempts to smooth", attempts, scenario.shortcuts),
+    ]
     for what, count, limit in limits:
         over = limit is not None and count > limit
         tally.one(None, f"{count:,} {what}; {limit:,} are allowed" if over else None)
 
 
-def bounds(case: Case, tally: Tally) -> None:
+def endings(case: Case, tally: Tally) -> None:
+    """A budget that is said to have ended planning was used up; a path that was to end it did."""
+    phases = case.events[Kind.PHASE]
+    plan = phases[phases["name"] == Phase.PLAN]
+    ends = plan[plan["status"] != Status.BEGIN][-1:]
+    if not case.known or not len(ends):
+        return
+    scenario, wrong = case.manifest.scenario, None
+    if case.outcome is Status.ITERATION_LIMIT:
+        wrong = _left(case)
+    elif case.outcome is Status.TIME_LIMIT:
+        took = int(ends["t"][0] - plan["t"][0]) / 1e9
+        if scenario.time is None:
+            wrong = "planning ended for want of time, but its time was not limited"
+        elif scenario.clock == "real" and took < scenario.time * (1 - CLOSE) - _TICK_S:
+            wrong = f"planning ended after {took:.6f} s; it had {scenario.time:g} s"
+    elif case.outcome is Status.SOLVED and case.contract.stops is False:
+        wrong = "planning ended as solved; it was to go on for a better path"
+    tally.one(ends[0], wrong)
+
+
+def _left(case: Case) -> str | None:
+    """Say what was left of a budget of iterations."""
+    scenario, draws = case.manifest.scenario, case.kept.last_iteration
+    limit, made = scenario.make_stop().iterations, _made(case)
+    spent = scenario.draws is not None and draws >= scenario.draws
+    # Where failed draws do not count, their number has an end all the same.
+    spent |= made < draws and draws >= 1000 * limit
+    return None if made >= limit or spent else f"planning made {made:,} of {limit:,} iterations"
+
+
+def bounds(case: Case, tally: Tally) -> Windows:
     """Samples, nodes, cells, moves and waypoints lie in bounds, joint limits and [-pi, pi).
 
     The last is for angles that wrap: each configuration has one way of being written.
     """
-    slack = np.where(endless(case.robot, case.events.dof), 0.0, case.blur)
-    low, high = case.lower - slack, case.upper + slack
-    high = np.where(endless(case.robot, case.events.dof), np.nextafter(np.pi, 0), high)
-    for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE):
-        table = case.events[kind]
-        q = np.asarray(table["q"])
-        wrong = np.asarray(~((low <= q) & (q <= high)).all(axis=1))
-        tally.look(table, wrong, lambda i, k=kind, q=q: f"{k.label} at {text(q[i])}")  # type: ignore[misc]
-    for event, path in case.paths:
-        out = np.flatnonzero(~((low <= path) & (path <= high)).all(axis=1))
-        tally.one(event, f"waypoint {out[0]} at {text(path[out[0]])}" if len(out) else None)
-
-
-def samples(case: Case, tally: Tally) -> None:
-    """Samples of the goal are the goal; the other tree's goal is the start."""
-    table = case.events[Kind.SAMPLE]
-    goals = table[table["source"] == Source.GOAL]
-    q = np.asarray(goals["q"])
-    wrong = (q != case.goal).any(axis=1)
-    wrong &= (goals["tree"] != 1) | (q != case.start).any(axis=1)
-    tally.look(goals, wrong, lambda i: f"sample {text(goals['q'][i])} is not the goal")
+    turns = endless(case.robot, case.dof)
+    slack = np.where(turns, 0.0, case.blur)
+    low = case.lower - slack
+    high = np.where(turns, np.nextafter(np.pi, 0), case.upper + slack)
+    while (window := (yield)) is not None:
+        for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE):
+            table = window[kind]
+            q = np.asarray(table["q"])
+            wrong = np.asarray(~((low <= q) & (q <= high)).all(axis=1))
+            tally.look(table, wrong, lambda i, k=kind, q=q: f"{k.label} at {text(q[i])}")  # type: ignore[misc]
+        for event in window[Kind.PATH]:
+            path = waypoints(event, case.dof)
+            out = np.flatnonzero(~((low <= path) & (path <= high)).all(axis=1))
+            tally.one(event, f"waypoint {out[0]} at {text(path[out[0]])}" if len(out) else None)
 
 
 def text(q: NDArray[np.float64]) -> str:
@@ -161,5 +207,5 @@ def text(q: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(q).tolist()) + ")"
 
 
-RULES = (numbering, times, phases, names, outcome, budget, bounds, samples)
+RULES = (numbering, times, phases, names, outcome, budget, endings, bounds)
 """All rules of this file; see `brrt.replay.checks`."""

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Phase, Status, Table
-from brrt.replay.checks.case import CLOSE, Case, Tally
+from brrt.replay.checks.case import CLOSE, Case
 from brrt.replay.checks.log import text
 from brrt.replay.checks.motions import towards
+from brrt.replay.checks.tally import Tally
 
 Floats = NDArray[np.float64]
 
@@ -89,9 +90,11 @@ def moves_free(case: Case, tally: Tally) -> None:
 
 
 def arrival(case: Case, tally: Tally) -> None:
-    """Where the run is solved, the last move ends at the goal."""
+    """Where the run is solved and nobody stopped it, the last move ends at the goal."""
     table = case.events[Kind.MOVE]
-    if len(table) and case.outcome is Status.SOLVED and not case.cut:
+    phases = case.events[Kind.PHASE]
+    stopped = bool((phases["status"][-1:] == Status.INTERRUPTED).any())
+    if len(table) and case.outcome is Status.SOLVED and not case.cut and not stopped:
         there = (np.asarray(table["q"][-1]) == case.goal).all()
         wrong = f"the last move ends at {text(table['q'][-1])}, not at the goal"
         tally.one(table[-1], None if there else wrong)

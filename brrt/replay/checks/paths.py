@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Stage
-from brrt.replay.checks.case import Case, Tally
+from brrt.replay.checks.case import Case
 from brrt.replay.checks.log import text
+from brrt.replay.checks.tally import Tally
 from brrt.replay.ledger import SOUND
 
 Floats = NDArray[np.float64]
@@ -99,7 +100,10 @@ class _Parents:
         self.done = 0
         self.nodes: dict[Place, list[int]] = {}
         # Looking at one coordinate first leaves few of a large tree's nodes.
-        near = np.flatnonzero(np.isin(self.q[:, 0], [place[0] for place in wanted]))
+        some = np.unique([place[0] for place in wanted])
+        x = self.q[:, 0]
+        at = np.minimum(np.searchsorted(some, x), len(some) - 1)
+        near = np.flatnonzero(some[at] == x) if len(some) else np.empty(0, np.int64)
         for node, place in zip(near.tolist(), _places(self.q[near]), strict=True):
             if place in wanted:
                 self.nodes.setdefault(place, []).append(node)
@@ -126,7 +130,7 @@ def _links(case: Case, trees: list[_Parents]) -> dict[tuple[Place, Place], int]:
     for link in case.events[Kind.CONNECT]:
         ends = []
         for number, name in ((0, "node"), (1, "other")):
-            q = by_number.get(number, np.empty((0, case.events.dof)))
+            q = by_number.get(number, np.empty((0, case.dof)))
             if 0 <= link[name] < len(q):
                 ends.append(tuple(q[link[name]].tolist()))
         if len(ends) == 2:
@@ -138,7 +142,7 @@ def _links(case: Case, trees: list[_Parents]) -> dict[tuple[Place, Place], int]:
 def shortcuts(case: Case, tally: Tally) -> None:
     """Shortcuts replace what lies between two waypoints by a free motion; the cost never rises."""
     table = case.events[Kind.SHORTCUT]
-    path, cost, due = np.empty((0, case.events.dof)), np.inf, list(case.found)
+    path, cost, due = np.empty((0, case.dof)), np.inf, list(case.found)
     for event in table:
         while due and due[0][0]["seq"] < event["seq"]:
             first, path = due.pop(0)

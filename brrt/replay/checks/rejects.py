@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Table
-from brrt.replay.checks.case import Case, Tally
+from brrt.events import Kind, Reason, Table, table_dtype
+from brrt.replay.checks.case import Case, Windows
+from brrt.replay.checks.keeping import Thinned
 from brrt.replay.checks.log import text
 from brrt.replay.checks.motions import all_clear
+from brrt.replay.checks.tally import Tally
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,18 +19,19 @@ MOST = 20_000
 _BLOCKED = (Reason.COLLISION, Reason.GOAL_BLOCKED, Reason.LINK_BLOCKED, Reason.NEAR_BLOCKED)
 
 
-def rejections(case: Case, tally: Tally) -> None:
+def rejections(case: Case, tally: Tally) -> Windows:
     """What is rejected for a collision touches something; of many, 20,000 are looked at.
 
     A point touches within 1e-9 of the lengths at hand, a body within 2e-6 of the map's longest
     side: twice the clearance that the planners' own check tells from a touch.
     """
+    kept = Thinned(table_dtype(Kind.REJECT, case.dof), MOST)
+    while (window := (yield)) is not None:
+        table = window[Kind.REJECT]
+        kept.add(table[np.isin(table["reason"], [int(reason) for reason in _BLOCKED])])
     if not case.known:
         return
-    table = case.events[Kind.REJECT]
-    table = table[np.isin(table["reason"], [int(reason) for reason in _BLOCKED])]
-    if len(table) > MOST:
-        table = table[np.linspace(0, len(table) - 1, MOST).astype(np.int64)]
+    table = kept.rows()
     a, b = _origins(case, table), np.asarray(table["q"])
     there = np.isfinite(a).all(axis=1)
     tally.look(
@@ -45,18 +48,22 @@ def rejections(case: Case, tally: Tally) -> None:
     )  # fmt: skip
 
 
-def limits(case: Case, tally: Tally) -> None:
+def limits(case: Case, tally: Tally) -> Windows:
     """What is rejected for the limits lies beyond them."""
-    table = case.events[Kind.REJECT]
-    table = table[table["reason"] == Reason.LIMITS]
-    q = np.asarray(table["q"])
-    within = ((case.lower + case.blur < q) & (q < case.upper - case.blur)).all(axis=1)
-    tally.look(table, np.asarray(within), lambda i: f"rejected, but {text(q[i])} is within")
+    while (window := (yield)) is not None:
+        table = window[Kind.REJECT]
+        table = table[table["reason"] == Reason.LIMITS]
+        q = np.asarray(table["q"])
+        within = ((case.lower + case.blur < q) & (q < case.upper - case.blur)).all(axis=1)
+        tally.look(
+            table, np.asarray(within),
+            lambda i, q=q: f"rejected, but {text(q[i])} is within",  # type: ignore[misc]
+        )  # fmt: skip
 
 
 def _origins(case: Case, table: Table) -> Floats:
     """Where extensions left from, nan where no such node was there; shape (n, dof)."""
-    q = np.full((len(table), case.events.dof), np.nan)
+    q = np.full((len(table), case.dof), np.nan)
     if case.contract.lattice is not None:
         seen = case.events[Kind.EXPAND]
         _fill(q, np.ones(len(table), bool), table, seen["cell"], seen)

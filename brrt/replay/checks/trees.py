@@ -1,12 +1,15 @@
 """Rules about trees: nodes and parents, costs at every moment, rewires, links."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Table
-from brrt.replay.checks.case import Case, Tally
+from brrt.replay.checks.case import Case, Grown, folded
 from brrt.replay.checks.log import text
-from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions, fold
+from brrt.replay.checks.tally import Tally
+from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions
 
 Floats = NDArray[np.float64]
 
@@ -14,15 +17,17 @@ Floats = NDArray[np.float64]
 def nodes(case: Case, tally: Tally) -> None:
     """Nodes join a tree as 0, 1, 2 ... below a node that is there."""
     for tree in case.trees:
-        edges, verdict = tree.edges, tree.of_edges(tree.ledger.verdict)
-        misnumbered = edges["node"] != np.arange(len(edges))
-        tally.look(
-            edges, misnumbered | (verdict != SOUND),
-            lambda i, e=edges, m=misnumbered: (  # type: ignore[misc]
-                f"node {e['node'][i]} joins tree {e['tree'][i]} as its node {i}" if m[i]
-                else f"node {i} gets parent {e['parent'][i]}, which is not there"
-            ),
-        )  # fmt: skip
+        verdict = tree.of_edges(tree.ledger.verdict)
+        for span in tree.spans():
+            edges, first = tree.edges[span], span.start
+            misnumbered = edges["node"] != np.arange(span.start, span.stop)
+            tally.look(
+                edges, misnumbered | (verdict[span] != SOUND),
+                lambda i, e=edges, m=misnumbered, n=first: (  # type: ignore[misc]
+                    f"node {e['node'][i]} joins tree {e['tree'][i]} as its node {n + i}" if m[i]
+                    else f"node {n + i} gets parent {e['parent'][i]}, which is not there"
+                ),
+            )  # fmt: skip
 
 
 def roots(case: Case, tally: Tally) -> None:
@@ -52,33 +57,44 @@ def edge_lengths(case: Case, tally: Tally) -> None:
     stepping = any(contract.step is not None for _, contract in case.stretches)
     sees = np.array([contract.line_of_sight for _, contract in case.stretches])
     for tree in case.trees if stepping else ():
-        edges, length = tree.edges, tree.of_edges(tree.length)
-        step = case.limits(edges, lambda contract: contract.step)
-        there = np.isfinite(length) | (edges["parent"] >= 0)
-        wrong = there & ~case.at_most(length, step) & (tree.of_edges(tree.ledger.verdict) == 0)
-        wrong &= ~sees[case.stretch(edges)] | (np.asarray(edges["q"]) != case.goal).any(axis=1)
-        tally.look(
-            edges[there], wrong[there],
-            lambda i, n=length[there], s=step[there]: (  # type: ignore[misc]
-                f"edge of {n[i]:.12g}; the step is {s[i]:.12g}"
-            ),
-        )  # fmt: skip
+        lengths, verdict = tree.of_edges(tree.length), tree.of_edges(tree.ledger.verdict)
+        for span in tree.spans():
+            edges, length = tree.edges[span], lengths[span]
+            step = case.limits(edges, lambda contract: contract.step)
+            there = np.isfinite(length) | (edges["parent"] >= 0)
+            wrong = there & ~case.at_most(length, step) & (verdict[span] == SOUND)
+            wrong &= ~sees[case.stretch(edges)] | (np.asarray(edges["q"]) != case.goal).any(axis=1)
+            tally.look(
+                edges[there], wrong[there],
+                lambda i, n=length[there], s=step[there]: (  # type: ignore[misc]
+                    f"edge of {n[i]:.12g}; the step is {s[i]:.12g}"
+                ),
+            )  # fmt: skip
+
+
+def _sound_edges(tree: Grown) -> Iterator[tuple[Table, NDArray[np.int64]]]:
+    """Yield edges that join a node to a parent that is there, and their numbers, part by part."""
+    verdict = tree.of_edges(tree.ledger.verdict)
+    for span in tree.spans():
+        edges = tree.edges[span]
+        rows = np.flatnonzero((verdict[span] == SOUND) & (edges["parent"] >= 0))
+        yield edges[rows], rows + span.start
 
 
 def edge_costs(case: Case, tally: Tally) -> None:
     """A node's cost is its parent's at that moment and the distance between them."""
     for tree in case.trees:
-        sound = tree.of_edges((tree.ledger.verdict == SOUND) & (tree.made.parent >= 0))
-        cost = tree.of_edges(tree.ledger.parent_cost + tree.length)[sound]
-        _look_cost(case, tally, tree.edges[sound], cost)
+        above, length = tree.of_edges(tree.ledger.parent_cost), tree.of_edges(tree.length)
+        for edges, rows in _sound_edges(tree):
+            _look_cost(case, tally, edges, above[rows] + length[rows])
 
 
 def edges_free(case: Case, tally: Tally) -> None:
     """Every edge of a tree is free of obstacles."""
     for tree in case.trees:
-        sound = tree.of_edges((tree.ledger.verdict == SOUND) & (tree.made.parent >= 0))
-        edges, q = tree.edges[sound], np.asarray(tree.edges["q"])
-        case.look_free(tally, edges, q[edges["parent"]], q[sound], "edge")
+        q = np.asarray(tree.edges["q"])
+        for edges, _ in _sound_edges(tree):
+            case.look_free(tally, edges, q[edges["parent"]], np.asarray(edges["q"]), "edge")
 
 
 def rewires(case: Case, tally: Tally) -> None:
@@ -180,11 +196,11 @@ def links(case: Case, tally: Tally) -> None:
 
 def _asked(case: Case, number: int, table: Table, name: str) -> tuple[Floats, Floats]:
     """Where the ends of links in a tree are, and what they cost then; nan where they are not."""
-    q, cost = np.full((len(table), case.events.dof), np.nan), np.full(len(table), np.nan)
+    q, cost = np.full((len(table), case.dof), np.nan), np.full(len(table), np.nan)
     for tree in case.trees:
         if tree.number == number and len(table):
             node = table[name].astype(np.int64)
-            cost = fold(tree.made, tree.length, Questions(table["seq"], node)).answers
+            cost = folded(tree.made, tree.length, Questions(table["seq"], node)).answers
             there = np.isfinite(cost)
             q[there] = tree.edges["q"][node[there]]
     return q, cost

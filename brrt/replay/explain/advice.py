@@ -1,10 +1,11 @@
 """What to try next: rules, each from figures to a command. None guesses beyond its figures."""
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from brrt.replay.explain.command import command, text
 from brrt.replay.explain.facts import Facts
 from brrt.scenario import Scenario
 
@@ -301,41 +302,6 @@ def _with(
     return Advice(why, command(scenario), scenario)
 
 
-def command(scenario: Scenario, out: str = "next.mcap") -> str:
-    """Write a scenario as the command that runs it, and records to `out`."""
-    words = ["brrt", "plan", *_options(scenario.as_dict(), Scenario().as_dict())]
-    for name, value in scenario.params.items():
-        if value is not None:
-            words += ["--param", f"{name}={_text(value)}"]
-    return shlex.join([*words, "--out", out])
-
-
-def _options(values: Mapping[str, Any], usual: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the options for what is not as usual; the seed always, and the world."""
-    names = ("world", "robot", "planner", "start", "goal", "seed", "iterations", "time",
-             "shortcuts", "max_move", "deadline")  # fmt: skip
-    for name in names:
-        value = values[name]
-        if value is not None and (value != usual[name] or name in ("world", "seed")):
-            text = value if isinstance(value, str) else _text(value)
-            option = f"--{name.replace('_', '-')}"
-            # A value that begins with a minus would be taken for an option.
-            yield from [f"{option}={text}"] if text.startswith("-") else [option, text]
-    if not values["smooth"]:
-        yield "--no-smooth"
-    if values["execute"]:
-        yield "--execute"
-
-
 def _ends(f: Facts) -> list[str]:
     names = [name for name in ("start", "goal") if getattr(f.scenario, name) is not None]
-    return [f"--{name}={_text(getattr(f.manifest, name))}" for name in names]
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return ",".join(_text(x) for x in value)
-    if isinstance(value, bool):
-        return str(value).lower()
-    short = f"{value:g}" if isinstance(value, float) else str(value)
-    return short if isinstance(value, str) or float(short) == value else repr(value)
+    return [f"--{name}={text(getattr(f.manifest, name))}" for name in names]

@@ -12,7 +12,7 @@ from brrt.planners.contract import Contract
 from brrt.replay.account import choice_name
 from brrt.replay.explain.gather import FAILED, Gather
 from brrt.replay.explain.places import Blocker, Coverage, Gap, Narrow, Places, Spot
-from brrt.replay.history import as_plain
+from brrt.replay.story import as_plain
 from brrt.robots import Robot
 from brrt.scenario import Manifest, Scenario
 from brrt.worlds.world import World
@@ -180,6 +180,8 @@ def facts(manifest: Manifest, world: World, robot: Robot, gather: Gather) -> Fac
     rejects = gather.rejects.rows()
     ends = gather.origins(rejects), np.asarray(rejects["q"])
     connected, way, narrow = places.narrow(start, goal)
+    if figures["solved"] and connected is None:
+        connected, way = True, f"the run found it; {way}"
     return Facts(
         manifest=manifest,
         contract=_contract(manifest, world),

@@ -1,0 +1,95 @@
+"""What is kept of a log that is read in windows: little of the many, all of the few."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Events, Kind, Reason, Table, table_dtype
+from brrt.planners.contract import Contract
+
+
+class Thinned:
+    """Rows of a long table, evenly spread over it.
+
+    Args:
+        dtype: Of the table.
+        most: Rows that are wanted at most.
+    """
+
+    def __init__(self, dtype: np.dtype[np.void], most: int) -> None:
+        self._rows, self._most, self._stride, self._seen = np.empty(0, dtype), most, 1, 0
+
+    def due(self, count: int) -> slice:
+        """Which of the next rows to keep: those of a number that the stride divides."""
+        first = -self._seen % self._stride
+        self._seen += count
+        return slice(first, None, self._stride)
+
+    def add(self, table: Table) -> None:
+        """Take in the next rows."""
+        self.keep(table[self.due(len(table))])
+
+    def keep(self, rows: Table) -> None:
+        """Keep rows that were due."""
+        self._rows = np.concatenate([self._rows, rows])
+        while len(self._rows) > 2 * self._most:
+            self._rows, self._stride = self._rows[::2], 2 * self._stride
+
+    def rows(self) -> Table:
+        """Return what is kept, at most what is wanted."""
+        rows = self._rows
+        if len(rows) > self._most:
+            rows = rows[np.linspace(0, len(rows) - 1, self._most).astype(np.int64)]
+        return rows
+
+
+class Kept:
+    """The events that rules look at once the whole log has been read.
+
+    Of a planner that grows trees that is all but the samples and most rejections: rules that look
+    at these do so while the log is read.
+
+    Args:
+        dof: Numbers in a configuration.
+        contract: What the planner promises.
+    """
+
+    def __init__(self, dof: int, contract: Contract) -> None:
+        self._dof, self._contract = dof, contract
+        self._parts: dict[Kind, list[Table]] = {kind: [] for kind in Kind}
+        self.last_iteration = 0
+
+    def take(self, window: Events) -> None:
+        """Keep what is needed of the next events."""
+        for kind, table in window.tables.items():
+            if not len(table):
+                continue
+            self.last_iteration = max(self.last_iteration, int(table["iteration"].max()))
+            rows = self._needed(kind, table)
+            if rows is not None:
+                self._parts[kind].append(table if rows.all() else table[rows])
+
+    def _needed(self, kind: Kind, table: Table) -> NDArray[np.bool_] | None:
+        if kind is Kind.SAMPLE:
+            return None
+        if kind is Kind.REJECT and self._contract.lattice is None:
+            if self._contract.near is None:
+                return None
+            return np.asarray(table["reason"] == Reason.NEAR_BLOCKED)
+        return np.ones(len(table), bool)
+
+    def events(self) -> Events:
+        """Join what was kept; each part makes way for the whole as it is copied."""
+        tables = {}
+        for kind, parts in self._parts.items():
+            if len(parts) == 1:
+                tables[kind] = parts[0]
+            elif parts:
+                table = np.empty(sum(map(len, parts)), table_dtype(kind, self._dof))
+                at = len(table)
+                while parts:
+                    part = parts.pop()
+                    table[at - len(part) : at] = part
+                    at -= len(part)
+                tables[kind] = table
+        self._parts = {kind: [] for kind in Kind}
+        return Events(self._dof, tables)
