@@ -22,8 +22,9 @@ def diff(
 ) -> None:
     """Compare two runs: settings, versions, outcome, figures, and the first event that differs.
 
-    Times, versions and names of files do not count. Exit code 0: the runs are equal; 1: they
-    differ.
+    Times, versions and names of files do not count.
+
+    Exit code 0: settings and events are equal; 1: something differs.
 
     brrt diff a.mcap b.mcap
 

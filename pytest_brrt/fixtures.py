@@ -137,7 +137,9 @@ class Golden:
         kept = files.failed(path)
         found = self._compare(path, fresh, tolerance, files.told(kept))
         if not found.equal:
+            # Told of the files, so that it is what `brrt diff` prints of them.
             golden.save(fresh, kept)
+            found = self._compare(path, read(kept), tolerance, files.told(kept))
             lines = [
                 _headline(found),
                 *found.lines(),

@@ -206,7 +206,7 @@ def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
     told = brrt("diff", a, b, "--json")
     assert told.code == 1
     assert told.json["first"]["seq"] == 3
-    assert told.json["settings"] == [{"name": "param step", "a": None, "b": 1.5}]
+    assert told.json["settings"] == [{"name": "param step", "a": "auto", "b": 1.5}]
     for kind in told.json["events"].values():
         assert kind["a"] > 0
     missing = brrt("diff", a, "none.mcap")

@@ -103,7 +103,7 @@ def test_false_alarms_are_as_rare_as_stated(*, paired: bool) -> None:
 
     `benchmarks/gate.py` does the same with runs of planners, and many more of them.
     """
-    rng, runs, n, alpha, margin = np.random.default_rng(5), 600, 12, 0.1, 0.25
+    rng, runs, n, alpha, margin = np.random.default_rng(5), 500, 15, 0.1, 0.25
     alarms = 0
     for _ in range(runs):
         shared = rng.normal(0, 0.5, n) if paired else 0.0

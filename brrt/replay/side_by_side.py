@@ -68,7 +68,6 @@ def _outcome(found: Comparison) -> Iterator[str]:
         if x is not None or y is not None:
             in_time = name in TIMES
             p, q = (_seconds(x), _seconds(y)) if in_time else _apart(x, y)
-            p, q = ("none" if value is None else text for value, text in ((x, p), (y, q)))
             said = name.removesuffix("_s").replace("_", " ")
             yield _row(f"  {said}", p, q, _change(x, y))
 
@@ -159,7 +158,8 @@ def _outcome_of(figures: Mapping[str, Any]) -> str:
 
 
 def _seconds(value: float | None) -> str:
-    value = value or 0.0
+    if value is None:
+        return "none"
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
         if value >= size:
             return f"{value / size:.3g} {unit}"
@@ -190,7 +190,7 @@ def _apart(a: Any, b: Any) -> tuple[str, str]:
 
 def _text(value: Any, digits: int = 6) -> str:
     if value is None:
-        return "auto"
+        return "none"
     if isinstance(value, bool | np.bool_):
         return str(bool(value)).lower()
     if isinstance(value, float | np.floating):

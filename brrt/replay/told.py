@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brrt.scenario import MOST, Manifest
+from brrt.scenario import MOST, Manifest, Scenario
 from brrt.worlds.world import World
 
 _PLAIN = ("planner", "seed", "draws", "time", "smooth", "shortcuts", "execute", "max_move",
@@ -45,7 +45,7 @@ def settings_of(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Ite
     limits = (each.make_stop().iterations for each in (ours, theirs))
     yield from _row("iterations", *("no limit" if n >= MOST else n for n in limits))
     yield from _row("branches", *(_branches(each) for each in (a, b)))
-    yield from rows_of("param", ours.settings(), theirs.settings())
+    yield from rows_of("param", *(_settings(each) for each in (ours, theirs)))
     yield from rows_of("robot", _robot(a, a_world), _robot(b, b_world))
     yield from _row("start", list(a.start), list(b.start))
     yield from _row("goal", list(a.goal), list(b.goal))
@@ -68,6 +68,11 @@ def rows_of(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator
     """Yield what differs in two tables of named values, with a word ahead of each name."""
     for name in dict.fromkeys([*a, *b]):
         yield from _row(f"{prefix} {name}".strip(), a.get(name), b.get(name))
+
+
+def _settings(scenario: Scenario) -> dict[str, Any]:
+    """Return the planner's settings, as the command line takes them where the planner decides."""
+    return {k: "auto" if v is None else v for k, v in scenario.settings().items()}
 
 
 def _branches(manifest: Manifest) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from brrt.again import RepeatedRun
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import Events
+from brrt.events import Events, Kind
 from brrt.files import replacing
 from brrt.planners import PLANNERS
 from brrt.recording import McapSink, Memory, Recording, read
@@ -52,7 +52,14 @@ def _made(run: Run) -> Recording:
     result = run.execute([log]).as_dict()
     if log.batches[0].kinds_in_order()[0] != 0:
         raise BrrtError("this Run has been made before; give a new one")
-    return Recording(run.manifest, run.problem.world, lambda: iter(log.batches), result)
+    counts = {kind: sum(batch.counts.get(kind, 0) for batch in log.batches) for kind in Kind}
+    return Recording(
+        run.manifest,
+        run.problem.world,
+        lambda: iter(log.batches),
+        result,
+        {kind: count for kind, count in counts.items() if count},
+    )
 
 
 def again(path: Path) -> Run:

@@ -208,11 +208,11 @@ class Watch:
     Args:
         bet: The bet.
         tests: Bets that share the chance of a false alarm.
-        alarm: That chance.
+        alarm: That chance; `ALARM` by default.
     """
 
-    def __init__(self, bet: Bet, tests: int = 1, alarm: float = ALARM) -> None:
-        self._bet, self._rich = bet, math.log(tests / alarm)
+    def __init__(self, bet: Bet, tests: int = 1, alarm: float | None = None) -> None:
+        self._bet, self._rich = bet, math.log(tests / (ALARM if alarm is None else alarm))
         self._seen, self._next, self.found = 0, _FIRST, False
 
     def follow(self, draws: Floats) -> Iterator[tuple[int, str]]:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Phase, Stage, Status, Table
+from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.planners.contract import Lattice
-from brrt.replay.checks.case import CLOSE, Case
+from brrt.replay.checks.case import CLOSE, Case, Windows
 from brrt.replay.checks.log import text
 from brrt.replay.checks.tally import Tally
 
@@ -221,33 +221,32 @@ def _origins(case: Case, table: Table) -> Floats:
     return before
 
 
-def choices(case: Case, tally: Tally) -> None:
+def choices(case: Case, tally: Tally) -> Windows:
     """With a lookahead of 1 each move is to a free neighbour of least cost and estimate."""
     lattice = _lattice(case)
-    if lattice is None or lattice.lookahead != 1:
-        return
-    walk = _Walk(case, lattice)
-    for kind, event, place in _in_order(case, lattice):
-        if kind is Kind.REJECT:
-            walk.reject(int(event["node"]), place)
-        elif kind is Kind.HEURISTIC:
-            walk.h[place] = float(event["h"])
-        elif kind is Kind.EXPAND:
-            walk.look(int(event["cell"]), place)
-        elif event["cell"] >= 0:
-            tally.one(event, walk.judge(place))
+    walk = _Walk(case, lattice) if lattice is not None and lattice.lookahead == 1 else None
+    while (window := (yield)) is not None:
+        if lattice is None or walk is None:
+            continue
+        for kind, event, place in _in_order(case, lattice, window):
+            if kind is Kind.REJECT:
+                walk.reject(int(event["node"]), place)
+            elif kind is Kind.HEURISTIC:
+                walk.h[place] = float(event["h"])
+            elif kind is Kind.EXPAND:
+                walk.look(int(event["cell"]), place)
+            elif event["cell"] >= 0:
+                tally.one(event, walk.judge(place))
 
 
-def _in_order(case: Case, lattice: Lattice) -> Iterator[tuple[Kind, np.void, Cell]]:
+def _in_order(case: Case, lattice: Lattice, window: Events) -> Iterator[tuple[Kind, np.void, Cell]]:
     """Yield what a search says, one after the other, with its place on the lattice."""
-    tables = {kind: case.events[kind] for kind in (Kind.REJECT, Kind.HEURISTIC, Kind.EXPAND)}
-    tables[Kind.MOVE] = _planned_moves(case)
     rows = [
         (int(seq), kind, event, place)
-        for kind, table in tables.items()
+        for kind in (Kind.REJECT, Kind.HEURISTIC, Kind.EXPAND, Kind.MOVE)
         for seq, event, place in zip(
-            table["seq"], table, map(tuple, _indices(case, lattice, table["q"]).tolist()),
-            strict=True,
+            window[kind]["seq"], window[kind],
+            map(tuple, _indices(case, lattice, window[kind]["q"]).tolist()), strict=True,
         )
     ]  # fmt: skip
     rows.sort(key=lambda row: row[0])

@@ -126,7 +126,8 @@ def _with_path(case: Case) -> set[Status]:
 def _made(case: Case) -> int:
     """Iterations that count."""
     made, begin = 0, 0
-    adding = np.unique(case.events[Kind.EDGE]["iteration"])
+    joins = case.events[Kind.EDGE]["iteration"]
+    adding = joins[np.diff(joins, prepend=-1) != 0]
     ends = [*(branch.iteration for branch in case.manifest.branches), case.kept.last_iteration]
     for end, (_, ruling) in zip(ends, case.manifest.stretches, strict=True):
         # Where failed draws do not count, only those that add a node do.

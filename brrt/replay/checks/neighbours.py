@@ -108,12 +108,14 @@ class Neighbours:
 def _curve(q: Floats) -> Ints:
     """Number places along a curve that leaves no neighbourhood in a hurry (Morton 1966)."""
     low, high = q.min(axis=0), q.max(axis=0)
-    bits = min(16, 60 // q.shape[1])
-    cells = np.nan_to_num((q - low) / np.where(high > low, high - low, 1)) * (2.0**bits - 1)
-    whole, keys = cells.astype(np.int64), np.zeros(len(q), np.int64)
-    for bit in range(bits - 1, -1, -1):
-        for k in range(q.shape[1]):
-            keys = keys << 1 | whole[:, k] >> bit & 1
+    bits, wide = min(16, 60 // q.shape[1]), np.where(high > low, high - low, 1)
+    keys = np.zeros(len(q), np.int64)
+    for first in range(0, len(q), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        cells = (np.nan_to_num((q[some] - low) / wide) * (2.0**bits - 1)).astype(np.int64)
+        for bit in range(bits - 1, -1, -1):
+            for k in range(q.shape[1]):
+                keys[some] = keys[some] << 1 | cells[:, k] >> bit & 1
     return keys
 
 

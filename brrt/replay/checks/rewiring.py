@@ -177,13 +177,14 @@ def paths_told(case: Case, tally: Tally) -> None:
     moments = moments[::-1][::fewer][::-1]
     if not len(ways) or not len(moments):
         return
-    least = np.full(len(moments), np.inf)
-    for known, pair, far in ways:
-        cost = np.full(len(moments), far)
-        for tree, node in zip(case.trees, pair, strict=False):
-            asked = Questions(moments, np.full(len(moments), node))
-            cost = cost + folded(tree.made, tree.length, asked).answers
-        least = np.fmin(least, np.where(moments >= known, cost, np.inf))
+    # All ways at each moment are asked for at once: a tree is gone through but once.
+    cost = np.array([far for *_, far in ways]) + np.zeros((len(moments), len(ways)))
+    for number, tree in enumerate(case.trees[: len(ways[0][1])]):
+        nodes = np.array([pair[number] for _, pair, _ in ways])
+        asked = Questions(np.repeat(moments, len(ways)), np.tile(nodes, len(moments)))
+        cost += folded(tree.made, tree.length, asked).answers.reshape(cost.shape)
+    known = moments[:, None] >= np.array([since for since, *_ in ways])
+    least = np.fmin.reduce(np.where(known, cost, np.inf), axis=1)
     paths = case.events[Kind.PATH]
     paths = paths[paths["stage"] != Stage.SMOOTHED]
     told = np.append(np.inf, paths["cost"])[np.searchsorted(paths["seq"], moments, side="right")]
