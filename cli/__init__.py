@@ -1,4 +1,4 @@
-"""The `brrt` command, installed as `brrt_cli`; only its entry point imports it.
+"""What people use brrt by: the `brrt` command, and the plugin for pytest; installed as `brrt_cli`.
 
 PYTEST_DONT_REWRITE: see `brrt`.
 """

@@ -14,7 +14,7 @@ def test_every_package_is_listed() -> None:
     listed = set(project["tool"]["setuptools"]["packages"])
     found = {
         ".".join(("brrt_cli", *rest) if top == "cli" else (top, *rest))
-        for top in ("brrt", "cli", "pytest_brrt")
+        for top in ("brrt", "cli")
         for init in (ROOT / top).rglob("__init__.py")
         for _, *rest in [init.parent.relative_to(ROOT).parts]
     }

@@ -282,7 +282,7 @@ def test_tolerance(pytester: pytest.Pytester, run: Pytest) -> None:
 
 STAND_IN = """
 import pytest
-from pytest_brrt.watch import LEDGER
+from brrt_cli.testing.watch import LEDGER
 
 @pytest.fixture
 def brrt_golden(request):
@@ -445,7 +445,7 @@ def test_update_is_refused_in_ci_and_settings_are_checked(
     assert "brrt_unused must be report or fail, not 'maybe'" in text(wrong)
 
 
-@pytest.mark.parametrize("name", ["brrt", "brrt_cli", "pytest_brrt"])
+@pytest.mark.parametrize("name", ["brrt", "brrt_cli"])
 def test_no_warning_where_it_was_imported_ahead_of_pytest(name: str) -> None:
     """Of all that a wheel with a plugin installs, pytest wants to rewrite the assertions.
 
@@ -460,7 +460,7 @@ import sys
 def test_nothing_is_loaded():
     heavy = {"brrt", "numpy", "numba", "rerun", "mcap", "yaml", "rich", "typer"}
     assert not heavy & set(sys.modules)
-    assert "pytest_brrt.plugin" in sys.modules
+    assert "brrt_cli.testing.plugin" in sys.modules
 """
 
 

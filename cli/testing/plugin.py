@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pytest_brrt.ledger import Ledger
-from pytest_brrt.watch import LEDGER, Watch
+from .ledger import Ledger
+from .watch import LEDGER, Watch
 
 if TYPE_CHECKING:
-    from pytest_brrt.fixtures import Gate, Golden
+    from .fixtures import Gate, Golden
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -70,7 +70,7 @@ def brrt_golden(request: pytest.FixtureRequest) -> "Golden":
 
     The failure's message is what `brrt diff` prints. pytest --brrt-update makes and renews files.
     """
-    from pytest_brrt.fixtures import Golden  # noqa: PLC0415 - brrt takes a second to import
+    from .fixtures import Golden  # noqa: PLC0415 - brrt takes a second to import
 
     return Golden(request)
 
@@ -83,6 +83,6 @@ def brrt_gate(request: pytest.FixtureRequest) -> "Gate":
 
     fails where the data prove that costs grew by more than 2 %, or iterations by more than 10 %.
     """
-    from pytest_brrt.fixtures import Gate  # noqa: PLC0415 - brrt takes a second to import
+    from .fixtures import Gate  # noqa: PLC0415 - brrt takes a second to import
 
     return Gate(request)

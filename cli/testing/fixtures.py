@@ -16,7 +16,8 @@ from brrt import BrrtError, Comparison, Recording, compare, read
 from brrt.testing import golden
 from brrt.testing.figures import Figures, Source
 from brrt.testing.gate import ALPHA, SEEDS, Verdict, check_question, gate
-from pytest_brrt.watch import LEDGER
+
+from .watch import LEDGER
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+=,-]*")
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from pytest_brrt.ledger import Ledger
+from .ledger import Ledger
 
 LEDGER = pytest.StashKey[Ledger]()
 
