@@ -310,6 +310,15 @@ def test_recover_says_what_it_did(brrt: Command, tmp_path: Path) -> None:
     assert "save them with brrt recover" in brrt("replay", "cut.mcap").err
 
 
+def test_recover_to_a_disk_that_is_full(tmp_path: Path) -> None:
+    """The message names the file that was asked for, and nothing is left of it."""
+    path, whole = tmp_path / "run.mcap", tmp_path / "whole.mcap"
+    write(path)
+    with files_limited_to(20_000), pytest.raises(RecordingError, match=r" \S+/whole\.mcap: File"):
+        recover(path, whole)
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_killed_rrd_is_replayed_in_part(brrt: Command, tmp_path: Path) -> None:
     """As an .mcap is: refused with what can be saved, taken with --partial."""
     log = write(tmp_path / "run.rrd")

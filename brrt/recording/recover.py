@@ -50,15 +50,24 @@ def recover(cut: Path | str, whole: Path | str) -> Recovery:
         raise BrrtError(f"{whole}: is the recording itself; choose another name")
     recording = _read(cut)
     with replacing(whole) as unfinished:
-        sink = _sink(unfinished, recording)
         try:
-            recovery = _copy(recording, sink)
-            if recovery.lost is not None:
-                sink.annotate(NOTE, _note(cut, recovery))
-        except BaseException:
-            sink.close(whole=False)
-            raise
-        sink.close(whole=recovery.ended)
+            recovery = _rewrite(cut, recording, unfinished)
+        except RecordingError as error:
+            raise RecordingError(str(error).replace(str(unfinished), str(whole))) from None
+    return recovery
+
+
+def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
+    """Write what is sound of a recording to a path."""
+    sink = _sink(path, recording)
+    try:
+        recovery = _copy(recording, sink)
+        if recovery.lost is not None:
+            sink.annotate(NOTE, _note(cut, recovery))
+    except BaseException:
+        sink.close(whole=False)
+        raise
+    sink.close(whole=recovery.ended)
     return recovery
 
 
