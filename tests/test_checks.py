@@ -567,10 +567,10 @@ def test_doctored_logs_are_found(
 
 def test_every_rule_has_a_doctored_log() -> None:
     """Whoever adds a rule adds what it is for."""
-    from . import test_draws, test_growing, test_rewiring
+    from . import test_draws, test_growing, test_rewiring, test_searches
 
     names = {rule.__name__.replace("_", " ") for rule in RULES}
-    others = (test_draws.DOCTORED, test_growing.DOCTORED, test_rewiring.DOCTORED)
+    others = (t.DOCTORED for t in (test_draws, test_growing, test_rewiring, test_searches))
     assert names == {rule for rule, *_ in [*DOCTORED, *chain(*others)]}
     assert all((rule.__doc__ or "").strip() for rule in RULES)
 
