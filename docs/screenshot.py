@@ -1,69 +1,150 @@
-"""Make the README's pictures anew, runs included.
+"""Make the pictures of the README and of the gallery anew, runs included.
 
-    python docs/screenshot.py --readme
-    python docs/screenshot.py --readme --to FOLDER
+    python docs/screenshot.py
+    python docs/screenshot.py rrt2d.png web.png --to FOLDER
 
-Other pictures are made by `brrt view RUN --screenshot OUT.png --at-iteration N`, which says what
-to install where the viewer cannot run.
+It needs `pip install -e '.[test]'`; `brrt view --screenshot` says what to install where the viewer
+cannot run. The picture of the browser needs Chromium, and is left out where there is none.
 """
 
 import argparse
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from PIL import Image
 
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from tests.browser import CHROMIUM, browser  # noqa: E402 - it is no package that is installed
+
 SIZE, WIDTH = (1600, 900), 1024
-"""Of the viewer, and of the pictures in pixels: a few hundred kB would be too much to load."""
+"""Of the viewer and of the pictures, in pixels: a few hundred kB would be too much to load."""
+SLIDER = 0.62, 0.981
+"""Where the browser's time slider is clicked, as parts of the page."""
 
 STAR = "--planner rrt-star --seed 3 --iterations 600"
-README: dict[str, tuple[tuple[str, ...], int | None]] = {
-    "rrt2d.png": (
+
+
+class Picture(NamedTuple):
+    """How a picture is made.
+
+    Attributes:
+        runs: What `brrt plan` is told, for one run or two.
+        shown: What `brrt view` is told, or `brrt plot` if that is its first word, or "web".
+    """
+
+    runs: tuple[str, ...]
+    shown: str
+
+
+PICTURES = {
+    "rrt2d.png": Picture(
         ("--world squares2d:n=120,seed=4,min_side=3,max_side=10 --seed 7 --param step=2.5",),
-        648,
+        "--at-iteration 648",
     ),
-    "bi_rrt_star.png": (
+    "rrt3d.png": Picture(("--world gap3d --seed 2",), "--at-iteration 4000"),
+    "bi_rrt_star.png": Picture(
         ("--planner bi-rrt-star --world squares2d:n=60,seed=3 --seed 1 --iterations 5000",),
-        600,
+        "--at-iteration 600",
     ),
-    "pair.png": ((STAR, f"{STAR} --param informed=true"), None),
+    "pair.png": Picture((STAR, f"{STAR} --param informed=true"), ""),
+    "polygon.png": Picture((f"{ROOT}/examples/house-hard.toml",), "--at-event 1422"),
+    "chain.png": Picture((f"{ROOT}/examples/arm-hard.toml",), "--at-event 619"),
+    "lrta2d.png": Picture(
+        ("--planner lrta-star --world bugtrap2d --param epsilon=1",), "--at-iteration 30000"
+    ),
+    "lrta3d.png": Picture(
+        ("--planner lrta-star --world window3d --param epsilon=1",), "--at-iteration 8000"
+    ),
+    "web.png": Picture(("--planner rrt-connect --world maze2d:seed=4 --seed 2",), "web"),
+    "plot.png": Picture((), f"plot {ROOT}/recordings/circles2d-rrt-star.mcap --dpi 150"),
 }
-"""How each run is made, one or two, and the iteration to show; None is where the two part."""
 
 
-def shoot_readme(folder: Path) -> None:
-    """Make the README's pictures."""
-    brrt = str(Path(sys.executable).with_name("brrt"))
-    size = "x".join(map(str, SIZE))
-    with tempfile.TemporaryDirectory() as made:
-        for name, (options, iteration) in README.items():
-            runs = [str(Path(made, f"{letter}.mcap")) for letter, _ in zip("AB", options)]  # noqa: B905
-            for run, each in zip(runs, options, strict=True):
-                command = [brrt, "plan", *each.split(), "--out", run, "--force"]
-                subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-            picture = folder / name
-            shown = ["--at-iteration", str(iteration)] if iteration is not None else []
-            command = [brrt, "view", *runs, *shown, "--size", size, "--screenshot", str(picture)]
-            subprocess.run([*command, "--force"], check=True)
-            shrink(picture)
+def make(name: str, folder: Path) -> None:
+    """Make a picture."""
+    picture, out = PICTURES[name], folder / name
+    with tempfile.TemporaryDirectory(prefix="pictures-") as made:
+        runs = [str(Path(made, f"{letter}.mcap")) for letter in "AB"[: len(picture.runs)]]
+        for run, options in zip(runs, picture.runs, strict=True):
+            brrt("plan", *options.split(), "--out", run, "--json", quiet=True)
+        if picture.shown == "web":
+            surf(runs[0], out)
+        elif picture.shown.startswith("plot "):
+            brrt(*picture.shown.split(), "--out", str(out), "--force")
+        else:
+            size = "x".join(map(str, SIZE))
+            shot = ("--size", size, "--screenshot", str(out), "--force")
+            brrt("view", *runs, *picture.shown.split(), *shot)
+    if not picture.shown.startswith("plot "):
+        shrink(out)
+
+
+def brrt(*args: str, quiet: bool = False) -> None:
+    """Run the command that stands beside this Python."""
+    command = [str(Path(sys.executable).with_name("brrt")), *args]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL if quiet else None)
+
+
+def surf(run: str, out: Path) -> None:
+    """Take a picture of the viewer in the browser, somewhere in the run."""
+    command = [str(Path(sys.executable).with_name("brrt")), "view", run, "--web"]
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server,
+        tempfile.TemporaryDirectory(prefix="browser-") as profile,
+    ):
+        try:
+            assert server.stdout is not None  # noqa: S101 - it is a pipe
+            address = server.stdout.readline().split(" at ")[1].strip()
+            with browser(Path(profile), SIZE, 300) as page:
+                page.visit(address)
+                stand_still(page.picture)
+                page.click(*(part * side for part, side in zip(SLIDER, SIZE, strict=True)))
+                out.write_bytes(stand_still(page.picture))
+        finally:
+            server.terminate()
+            server.wait()
+
+
+def stand_still(look: Callable[[], bytes]) -> bytes:
+    """Return a picture once it is no other than 2 s before: loading shows in between."""
+    last, png = b"", b"?"
+    while not png or png != last:
+        time.sleep(2)
+        last, png = png, look()
+    return png
 
 
 def shrink(picture: Path) -> None:
-    """Scale a picture to the width that the README shows."""
+    """Scale a picture to the width that is shown, in as many colours as it needs."""
     with Image.open(picture) as whole:
-        whole.thumbnail((WIDTH, WIDTH))
-        whole.save(picture, optimize=True)
+        small = whole.convert("RGB")
+    small.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
+    # Of Pillow's methods the one that keeps a colour that only a mark has.
+    plain = small.quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    plain.save(picture, optimize=True)
 
 
 def main() -> None:
     """Parse the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--readme", action="store_true", required=True)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(PICTURES))
     parser.add_argument("--to", type=Path, default=Path(__file__).parent, metavar="FOLDER")
     given = parser.parse_args()
-    shoot_readme(given.to)
+    unknown = set(given.names) - PICTURES.keys()
+    if unknown:
+        parser.error(f"no picture is called {', '.join(sorted(unknown))}")
+    for name in given.names or PICTURES:
+        if PICTURES[name].shown == "web" and CHROMIUM is None:
+            print(f"{name}: left out, there is no Chromium")
+            continue
+        make(name, given.to)
 
 
 if __name__ == "__main__":

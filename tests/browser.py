@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,6 +39,13 @@ class Page:
     def visit(self, address: str) -> None:
         """Go to an address."""
         self._ask("Page.navigate", url=address)
+
+    def click(self, x: float, y: float) -> None:
+        """Click at a place, in pixels from the left and from the top."""
+        where = {"x": x, "y": y, "button": "left", "clickCount": 1}
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            self._ask("Input.dispatchMouseEvent", type=kind, **where)
+            time.sleep(0.5)  # what draws a frame now and then looks at the mouse now and then
 
     def picture(self) -> bytes:
         """Return what the page shows, as a PNG; empty between two pages, where it shows nothing."""

@@ -75,3 +75,17 @@ def test_documents_name_no_file_that_is_missing() -> None:
     for link in links:
         if "://" not in link:
             assert (ROOT / link).exists(), link
+
+
+def test_pictures_are_small_and_shown() -> None:
+    """Each picture that the script makes is there, loads fast, and stands in the gallery."""
+    spec = importlib.util.spec_from_file_location("shots", ROOT / "docs" / "screenshot.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    gallery = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (ROOT / "docs" / "gallery.md").read_text())
+    assert gallery == list(module.PICTURES)
+    pictures = {path.name: path.stat().st_size for path in (ROOT / "docs").glob("*.png")}
+    assert pictures.keys() == {*gallery, "worlds.png"}
+    assert max(pictures.values()) < 200_000, pictures

@@ -297,7 +297,7 @@ def test_boxes_are_filled(sizes: list[tuple[float, float]], seed: int) -> None:
         far = np.where(
             (away > 0).any(axis=-1), np.hypot(*np.maximum(away, 0).T).T, -away.max(axis=-1)
         )
-        assert (far < radii[mine]).any(axis=1).mean() > 0.97  # not the round corners
+        assert (far < radii[mine]).any(axis=1).mean() > 0.99  # not the last of the corners
         assert (far[-1] < radii[mine]).any()
         assert (halves[mine] + radii[mine, None] < 1.000001 * corner / 2).all()
 

@@ -14,7 +14,8 @@ import rerun as rr
 from mcap.reader import make_reader
 
 from brrt import Events, McapSink, RecordingError, Run, Scenario, first_difference, read
-from brrt.recording import CutError, mcap_writer, rerun
+from brrt.planners.stop import Stop
+from brrt.recording import CutError, Memory, mcap_writer, rerun
 from brrt.recording.background import Background
 from brrt.recording.drain import Drain
 from brrt.recording.output import Output
@@ -195,6 +196,38 @@ def test_disk_that_fails_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("brrt.recording.output.os.fsync", fail)
     with pytest.raises(RecordingError, match="Input/output error"):
         run_all(sink, log)
+
+
+@pytest.mark.parametrize("planner", ["rrt", "rrt-star", "lrta-star", "a-star"])
+def test_slow_planners_hand_over_what_they_have(
+    planner: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where each iteration takes long, each is a batch; the log is the same all the same."""
+    scenario = Scenario(
+        world="circles2d:n=9", seed=1, planner=planner, iterations=60, clock="logical"
+    )
+    _, log = recorded(scenario)
+    clock = iter(range(10**9))
+    monkeypatch.setattr("brrt.kernels.emit._PATIENCE_S", -1.0)
+    monkeypatch.setattr("brrt.planners.stop.time.monotonic", lambda: float(next(clock)))
+    run, memory = Run(scenario), Memory()
+    run.stop._share = 1
+    run.execute([memory])
+    assert len(memory.batches) > 20
+    assert begins(log, memory.events())
+    assert len(memory.events()) == len(log)
+
+
+def test_share_of_a_slow_planner_and_of_a_fast_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop is given so much that it comes back about each tenth of a second."""
+    now = [0.0]
+    monkeypatch.setattr("brrt.planners.stop.time.monotonic", lambda: now[0])
+    for iteration_s in (1e-6, 1e-3, 1.0):
+        stop, share = Stop(iterations=10**9), 0
+        for _ in range(60):
+            share = stop.share(0)
+            now[0] += share * iteration_s
+        assert share == 1 or 0.05 <= share * iteration_s <= 0.4
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

@@ -427,7 +427,7 @@ def test_browser_shows_the_run(tmp_path: Path) -> None:
     [
         (["none.mcap"], "none.mcap: No such file or directory"),
         (["text.mcap"], "text.mcap: not a recording"),
-        (["cut.rrd", "--screenshot", "x.png"], "cut.rrd: cut or damaged"),
+        (["cut.rrd", "--screenshot", "x.png"], "cut.rrd: the file is cut at byte"),
         (["cut.mcap", "--screenshot", "x.png"], "show them with --partial"),
         (["a", "b", "c"], "one run, or two side by side, not 3"),
         (["run.mcap", "--screenshot", "no/x.png"], "there is no folder no"),

@@ -128,6 +128,9 @@ def _slots(kind: Kind) -> list[tuple[str, str, int]]:
     return places
 
 
+_PATIENCE_S = 0.25
+"""So long events may wait for their batch to fill: who records them waits as well."""
+
 _SLOTS: Mapping[Kind, list[tuple[str, str, int]]] = {kind: _slots(kind) for kind in Kind}
 
 
@@ -196,6 +199,7 @@ class EventLog:
         self.buffer.state[_TICK] = 1000 if logical_clock else 0
         self.epoch_ns = 0 if logical_clock else time.time_ns()
         self._origin = time.perf_counter_ns()
+        self._drained = time.monotonic()
         self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0
 
     def __len__(self) -> int:
@@ -205,6 +209,11 @@ class EventLog:
     def room(self) -> int:
         """Events that fit before the next `drain`."""
         return len(self.buffer.kind) - len(self)
+
+    @property
+    def overdue(self) -> bool:
+        """Whether events have waited long enough for a `drain`, though there is room for more."""
+        return len(self) > 0 and time.monotonic() - self._drained > _PATIENCE_S
 
     def reserve(self, events: int, points: int = 0) -> None:
         """Make a batch large enough for what a planner emits in one go.
@@ -306,6 +315,7 @@ class EventLog:
 
     def drain(self) -> Events:
         """Hand out the events held so far, and begin anew."""
+        self._drained = time.monotonic()
         n = len(self)
         first = int(self.buffer.state[_FIRST_SEQ])
         b = self.buffer

@@ -94,6 +94,8 @@ class AStar(LatticePlanner):
         began = log.elapsed_s
         status = None
         while status is None:
+            if log.overdue:
+                yield log.drain()
             done = int(counts[_a_star.EXPANSIONS])
             due = stop.reached(done, log.elapsed_s - began)
             limit = done + stop.share(done) if due is None else done

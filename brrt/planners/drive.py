@@ -97,6 +97,8 @@ class Drive:
         loop, log, counts = self._loop, self._log, self._loop.state.counts
         draw_limit = loop.draw_limit if stop.draws is None else min(loop.draw_limit, stop.draws)
         while not self._solved:
+            if log.overdue:
+                yield log.drain()
             due = stop.reached(self.counted, log.elapsed_s - self._began)
             # Even where the end is due, a loop still says what it has found.
             limit = self.counted if due is not None else self.counted + stop.share(self.counted)

@@ -66,6 +66,8 @@ class LRTAStar(LatticePlanner):
         began = log.elapsed_s
         status = None
         while status is None:
+            if log.overdue:
+                yield log.drain()
             done = int(counts[_lrta_star.MOVES])
             due = stop.reached(done, log.elapsed_s - began)
             limit = min(done + stop.share(done) if due is None else done, most)

@@ -1,12 +1,16 @@
 """When to stop, as a value that the caller passes."""
 
+import math
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import FrameType
 
 from brrt.events import Status
+
+_BRIEF_S, _LONG_S, _MOST_SHARE = 0.1, 0.4, 1 << 40
 
 
 @dataclass(slots=True)
@@ -24,6 +28,8 @@ class Stop:
     draws: int | None = None
     time_s: float | None = None
     interrupted: bool = False
+    _share: int = field(default=256, init=False, repr=False, compare=False)
+    _asked: float = field(default=math.inf, init=False, repr=False, compare=False)
 
     def reached(self, iterations: int, elapsed_s: float) -> Status | None:
         """Say why to stop, or None to go on."""
@@ -36,9 +42,18 @@ class Stop:
         return None
 
     def share(self, iterations: int) -> int:
-        """Iterations until the next look at the clock: few where time is limited."""
+        """Iterations until the next look at the clock and at `interrupted`: a tenth of a second.
+
+        Where time is limited they are few. No event depends on how a run is divided.
+        """
+        now = time.monotonic()
+        passed, self._asked = now - self._asked, now
+        if 0 <= passed < _BRIEF_S:
+            self._share = min(2 * self._share, _MOST_SHARE)
+        elif passed > _LONG_S:
+            self._share = max(1, self._share // 2)
         left = self.iterations - iterations
-        return left if self.time_s is None else min(left, 1024)
+        return min(left, self._share if self.time_s is None else min(self._share, 1024))
 
 
 @contextmanager

@@ -14,6 +14,8 @@ from brrt.worlds.occupancy import Grid
 from brrt.worlds.survey import covered
 from brrt.worlds.world import World
 
+_CORNERS = 1 / 16, 1 / 4
+"""Thinner lines along the edge of a box in 2D, in radii of the others, whose corners are round."""
 _LAYERS, _OVERLAP = 5, 1.5
 """Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
 covers the missing corner of the next."""
@@ -171,13 +173,14 @@ def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.
     """Boxes of thick lines nested in each other, and an edge: Rerun fills no shapes in 2D."""
     centre, half = (lower + upper) / 2, (upper - lower) / 2
     # The innermost box is no point: Rerun draws no line that goes nowhere.
-    radius = half.min(axis=1) / (1.25 + _OVERLAP * (_LAYERS - 1))
-    inset = (1 + _OVERLAP * np.arange(_LAYERS)[:, None]) * radius
+    thick = half.min(axis=1) / (1.25 + _OVERLAP * (_LAYERS - 1))
+    inset = np.append(_CORNERS, 1 + _OVERLAP * np.arange(_LAYERS))[:, None] * thick
+    radii = np.append(_CORNERS, np.ones(_LAYERS))[:, None] * thick
     nested = (half - inset[..., None]).reshape(-1, 2)
     return rr.Boxes2D(
-        centers=np.tile(centre, (_LAYERS + 1, 1)),
+        centers=np.tile(centre, (len(radii) + 1, 1)),
         half_sizes=np.concatenate([nested, half]),
-        radii=np.concatenate([np.tile(radius, _LAYERS), np.full(len(half), -0.5)]),
+        radii=np.append(radii, np.full(len(half), -0.5)),
         colors=OBSTACLE,
         draw_order=0,
     )

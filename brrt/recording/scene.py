@@ -152,7 +152,7 @@ def _results(figures: Mapping[str, Any] | None) -> dict[str, str]:
         return {}
     plural = "" if figures["iterations"] == 1 else "s"
     rows = {"status": f"{figures['status']} after {figures['iterations']:,} iteration{plural}"}
-    what = "cells" if figures["expanded"] else "nodes"
+    what = "expanded" if figures["expanded"] else "nodes"
     rows[what] = f"{figures['expanded'] or figures['nodes']:,}"
     if figures["plan_time_s"] is not None:
         rows["planning"] = f"{figures['plan_time_s'] * 1e3:.4g} ms"
