@@ -360,7 +360,7 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
         Kind.EXPAND, 3, q=c.log[Kind.EXPAND]["q"][3] + 0.1), set()),
     ("cells keep their numbers", "walk", plus(Kind.EXPAND, "cell", 3, 999), {"choices"}),
     ("cells keep their numbers", "walk", lambda c: c.edit(Kind.EXPAND, 3, cell=-3), {"choices"}),
-    ("expansions", "walk", lambda c: c.edit(Kind.EXPAND, 3, parent=0), set()),
+    ("expansions", "walk", lambda c: c.edit(Kind.EXPAND, 3, parent=0), {"best first"}),
     ("expansions", "walk", plus(Kind.EXPAND, "cost", 3, 1.0), set()),
     ("estimates", "walk", falling_h, {"choices"}),
     ("estimates admissible", "walk", bad_h, {"choices"}),
