@@ -360,7 +360,7 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
         Kind.EXPAND, 3, q=c.log[Kind.EXPAND]["q"][3] + 0.1), set()),
     ("cells keep their numbers", "walk", plus(Kind.EXPAND, "cell", 3, 999), {"choices"}),
     ("cells keep their numbers", "walk", lambda c: c.edit(Kind.EXPAND, 3, cell=-3), {"choices"}),
-    ("expansions", "walk", lambda c: c.edit(Kind.EXPAND, 3, parent=0), set()),
+    ("expansions", "walk", lambda c: c.edit(Kind.EXPAND, 3, parent=0), {"best first"}),
     ("expansions", "walk", plus(Kind.EXPAND, "cost", 3, 1.0), set()),
     ("estimates", "walk", falling_h, {"choices"}),
     ("estimates admissible", "walk", bad_h, {"choices"}),
@@ -567,10 +567,10 @@ def test_doctored_logs_are_found(
 
 def test_every_rule_has_a_doctored_log() -> None:
     """Whoever adds a rule adds what it is for."""
-    from . import test_draws, test_growing, test_rewiring
+    from . import test_draws, test_growing, test_rewiring, test_searches
 
     names = {rule.__name__.replace("_", " ") for rule in RULES}
-    others = (test_draws.DOCTORED, test_growing.DOCTORED, test_rewiring.DOCTORED)
+    others = (t.DOCTORED for t in (test_draws, test_growing, test_rewiring, test_searches))
     assert names == {rule for rule, *_ in [*DOCTORED, *chain(*others)]}
     assert all((rule.__doc__ or "").strip() for rule in RULES)
 

@@ -85,6 +85,21 @@ def test_stock_mcap_decodes_every_message(tmp_path: Path) -> None:
         assert counts[label] == figures[figure]
 
 
+@pytest.mark.parametrize("diagonals", [False, True])
+def test_a_lattice_has_more_cells_than_the_log_has_events(diagonals: bool, tmp_path: Path) -> None:
+    """Where nothing is in the way an event shows many cells at once, and all are numbered."""
+    scenario = Scenario(
+        world="boxes3d:n=0", planner="a-star", start=(50, 50, 50), goal=(90, 89, 88),
+        params={"epsilon": 2.0, "diagonals": diagonals}, smooth=False,
+    )  # fmt: skip
+    run, memory = Run(scenario), Memory()
+    sink = McapSink(tmp_path / "run.mcap", run.manifest, run.problem.world)
+    run.execute([sink, memory])
+    events = read(tmp_path / "run.mcap").events()
+    assert len(events) == len(memory.events())
+    assert events[Kind.EXPAND]["cell"].max() > len(events)
+
+
 def test_rosbags_decodes_every_message(tmp_path: Path) -> None:
     """Rosbags opens the bare file and reads every message."""
     _, log = write(tmp_path / "run.mcap", SCENARIOS["2d"])

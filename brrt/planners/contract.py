@@ -36,12 +36,15 @@ class Lattice:
         diagonals: Whether moves lead to all cells around (26 in 3D, 8 in 2D), or to 6 and 4.
         max_move: The goal is reached by a straight move of at most this length.
         lookahead: Cells expanded before each move; None where no robot moves meanwhile.
+        ordered: Whether ties go to the cell closer to the goal, by what is known by then, and then
+            to the one seen first.
     """
 
     epsilon: float
     diagonals: bool
     max_move: float
     lookahead: int | None
+    ordered: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,9 @@ class LRTAStar(LatticePlanner):
 
     def contract(self, problem: Problem) -> contract.Contract:  # noqa: ARG002
         """See `Planner.contract`."""
-        grid = contract.Lattice(self.epsilon, self.diagonals, self.max_move, self.lookahead)
+        grid = contract.Lattice(
+            self.epsilon, self.diagonals, self.max_move, self.lookahead, ordered=True
+        )
         return contract.Contract(lattice=grid)
 
     def solve(

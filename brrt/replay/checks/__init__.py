@@ -14,7 +14,18 @@ import numpy as np
 
 from brrt.events import Events
 from brrt.planners.contract import Contract
-from brrt.replay.checks import draws, growth, lattice, log, moves, paths, rejects, rewiring, trees
+from brrt.replay.checks import (
+    draws,
+    growth,
+    lattice,
+    log,
+    moves,
+    paths,
+    rejects,
+    rewiring,
+    searches,
+    trees,
+)
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.tally import Finding, Tally
 from brrt.scenario import Manifest
@@ -24,7 +35,7 @@ Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
     *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
-    *paths.RULES, *moves.RULES, *lattice.RULES,
+    *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
 )  # fmt: skip
 
 

@@ -20,13 +20,13 @@ Cell = tuple[int, ...]
 _KINDS = (Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE)
 
 
-def _lattice(case: Case) -> Lattice | None:
+def lattice_of(case: Case) -> Lattice | None:
     """The lattice that the planner promises, if it is one to reckon with."""
     lattice = case.contract.lattice
     return lattice if lattice is not None and lattice.epsilon > 0 else None
 
 
-def _indices(case: Case, lattice: Lattice, q: Any) -> Ints:
+def indices(case: Case, lattice: Lattice, q: Any) -> Ints:
     """Integer coordinates of the cells nearest to places, shape (n, d)."""
     cells = np.rint((np.asarray(q) - case.start) / lattice.epsilon)
     return np.asarray(np.where(np.abs(cells) < 1 << 40, cells, 1 << 40).astype(np.int64))
@@ -34,12 +34,12 @@ def _indices(case: Case, lattice: Lattice, q: Any) -> Ints:
 
 def cells_on_lattice(case: Case, tally: Tally) -> None:
     """Every cell lies a whole number of edges from the start along each axis."""
-    lattice = _lattice(case)
+    lattice = lattice_of(case)
     for kind in _KINDS if lattice is not None else ():
         assert lattice is not None  # noqa: S101 - the loop has no rounds otherwise
         table = _with_cells(case.events[kind])
         q = np.asarray(table["q"])
-        there = case.start + lattice.epsilon * _indices(case, lattice, q)
+        there = case.start + lattice.epsilon * indices(case, lattice, q)
         off = np.abs(q - there).max(axis=1, initial=0)
         wrong = ~(off <= CLOSE * lattice.epsilon + case.blur)
         tally.look(
@@ -54,7 +54,7 @@ def _with_cells(table: Table) -> Table:
 
 def cells_keep_their_numbers(case: Case, tally: Tally) -> None:
     """A number means one cell and a cell has one number; the start's is 0."""
-    lattice = _lattice(case)
+    lattice = lattice_of(case)
     if lattice is None:
         return
     tables = [_with_cells(case.events[kind]) for kind in _KINDS]
@@ -68,7 +68,7 @@ def cells_keep_their_numbers(case: Case, tally: Tally) -> None:
     if not len(cell):
         return
     seq = np.concatenate([table["seq"] for table in tables])
-    places = np.concatenate([_indices(case, lattice, table["q"]) for table in tables])
+    places = np.concatenate([indices(case, lattice, table["q"]) for table in tables])
     order = np.argsort(seq, kind="stable")
     cell, places = cell[order], places[order]
     _, place = np.unique(places, axis=0, return_inverse=True)
@@ -95,7 +95,7 @@ def _adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
 
 def expansions(case: Case, tally: Tally) -> None:
     """A cell is reached from a neighbour that its search expanded, freely; its cost is right."""
-    lattice, table = _lattice(case), case.events[Kind.EXPAND]
+    lattice, table = lattice_of(case), case.events[Kind.EXPAND]
     if lattice is None or not len(table):
         return
     parent = _parents(table)
@@ -109,7 +109,7 @@ def expansions(case: Case, tally: Tally) -> None:
     )  # fmt: skip
     some, above = table[parent >= 0], table[parent[parent >= 0]]
     a, b = np.asarray(above["q"]), np.asarray(some["q"])
-    apart = ~_adjacent(lattice, _indices(case, lattice, a), _indices(case, lattice, b))
+    apart = ~_adjacent(lattice, indices(case, lattice, a), indices(case, lattice, b))
     tally.look(
         some, apart,
         lambda i: f"cells {above['cell'][i]} and {some['cell'][i]} are no neighbours",
@@ -138,7 +138,7 @@ def _parents(table: Table) -> Ints:
 def estimates(case: Case, tally: Tally) -> None:
     """An estimate of the cost-to-go begins as the distance to the goal, and only rises."""
     table = case.events[Kind.HEURISTIC]
-    if _lattice(case) is None or not len(table):
+    if lattice_of(case) is None or not len(table):
         return
     h = np.asarray(table["h"])
     order = np.argsort(table["cell"], kind="stable")
@@ -154,11 +154,11 @@ def estimates(case: Case, tally: Tally) -> None:
 
 def estimates_admissible(case: Case, tally: Tally) -> None:
     """No estimate exceeds what a robot then spent to the goal from there, or along a path."""
-    lattice, table = _lattice(case), case.events[Kind.HEURISTIC]
+    lattice, table = lattice_of(case), case.events[Kind.HEURISTIC]
     if lattice is None or not len(table):
         return
     spent = _spent(case, lattice)
-    places = [tuple(p) for p in _indices(case, lattice, table["q"]).tolist()]
+    places = [tuple(p) for p in indices(case, lattice, table["q"]).tolist()]
     most = np.array([spent.get(place, np.inf) for place in places])
     judged = np.isfinite(most)
     some, limit = table[judged], most[judged]
@@ -179,7 +179,7 @@ def _spent(case: Case, lattice: Lattice) -> dict[Cell, float]:
     for way in ways:
         if not len(way) or (way[-1] != case.goal).any():
             continue
-        cells = _indices(case, lattice, way)
+        cells = indices(case, lattice, way)
         on = np.abs(case.start + lattice.epsilon * cells - way).max(axis=1) <= (
             CLOSE * lattice.epsilon + case.blur
         )
@@ -193,12 +193,12 @@ def _spent(case: Case, lattice: Lattice) -> dict[Cell, float]:
 
 def lattice_moves(case: Case, tally: Tally) -> None:
     """A robot on a lattice moves to a neighbour; the goal alone may be anywhere."""
-    lattice, table = _lattice(case), _planned_moves(case)
+    lattice, table = lattice_of(case), _planned_moves(case)
     if lattice is None or not len(table):
         return
     before = _origins(case, table)
     goal = table["cell"] < 0
-    near = _adjacent(lattice, *(_indices(case, lattice, q) for q in (before, table["q"])))
+    near = _adjacent(lattice, *(indices(case, lattice, q) for q in (before, table["q"])))
     wrong = np.where(goal, (np.asarray(table["q"]) != case.goal).any(axis=1), ~near)
     tally.look(
         table, wrong,
@@ -222,8 +222,11 @@ def _origins(case: Case, table: Table) -> Floats:
 
 
 def choices(case: Case, tally: Tally) -> Windows:
-    """With a lookahead of 1 each move is to a free neighbour of least cost and estimate."""
-    lattice = _lattice(case)
+    """With a lookahead of 1 each move is to a free neighbour of least cost and estimate.
+
+    The estimate of the cell that it leads from is raised to that, and is else what it was.
+    """
+    lattice = lattice_of(case)
     walk = _Walk(case, lattice) if lattice is not None and lattice.lookahead == 1 else None
     while (window := (yield)) is not None:
         if lattice is None or walk is None:
@@ -233,9 +236,11 @@ def choices(case: Case, tally: Tally) -> Windows:
                 walk.reject(int(event["node"]), place)
             elif kind is Kind.HEURISTIC:
                 walk.h[place] = float(event["h"])
+                walk.raised = place
             elif kind is Kind.EXPAND:
                 walk.look(int(event["cell"]), place)
             elif event["cell"] >= 0:
+                walk.numbers[place] = int(event["cell"])
                 tally.one(event, walk.judge(place))
 
 
@@ -246,7 +251,7 @@ def _in_order(case: Case, lattice: Lattice, window: Events) -> Iterator[tuple[Ki
         for kind in (Kind.REJECT, Kind.HEURISTIC, Kind.EXPAND, Kind.MOVE)
         for seq, event, place in zip(
             window[kind]["seq"], window[kind],
-            map(tuple, _indices(case, lattice, window[kind]["q"]).tolist()), strict=True,
+            map(tuple, indices(case, lattice, window[kind]["q"]).tolist()), strict=True,
         )
     ]  # fmt: skip
     rows.sort(key=lambda row: row[0])
@@ -262,6 +267,8 @@ class _Walk:
         self.h: dict[Cell, float] = {}
         self.blocked: dict[int, set[Cell]] = {}
         self.at: tuple[int, Cell] | None = None
+        self.raised: Cell | None = None
+        self.numbers: dict[Cell, int] = {}
         steps = product((-1, 0, 1), repeat=len(case.start))
         most = len(case.start) if lattice.diagonals else 1
         self.steps = [step for step in steps if 0 < sum(map(abs, step)) <= most]
@@ -272,7 +279,7 @@ class _Walk:
 
     def look(self, cell: int, place: Cell) -> None:
         """Look around from a cell; its estimate is still the one from before."""
-        self.at = cell, place
+        self.at, self.raised, self.numbers[place] = (cell, place), None, cell
 
     def estimate(self, place: Cell) -> float:
         """Return the estimate of the cost-to-go, which begins as the distance."""
@@ -296,8 +303,24 @@ class _Walk:
             if (other := tuple(x + s for x, s in zip(place, step, strict=True))) not in blocked
         }
         best, chosen = min(costs.values(), default=np.inf), costs.get(target, np.inf)
+        now = self.estimate(place)
+        if not self.case.at_most(np.asarray(min(best, 1e300)), now):
+            return f"the estimate of cell {cell} stays at {now:.12g}; it is to rise to {best:.12g}"
+        if self.raised == place and not self.case.at_most(np.asarray(now), best):
+            return f"the estimate of cell {cell} rises to {now:.12g}; it is to be {best:.12g}"
         if not self.case.at_most(np.asarray(chosen), best):
             return f"a move of cost and estimate {chosen:.12g}; {best:.12g} was there"
+        return self._tie(target, costs) if self.lattice.ordered else None
+
+    def _tie(self, target: Cell, costs: dict[Cell, float]) -> str | None:
+        """Say whether another cell of the very same cost and estimate goes before the target."""
+        h, number = self.estimate(target), self.numbers.get(target, 0)
+        for other, cost in costs.items():
+            if cost == costs[target] and other != target:
+                if self.estimate(other) < h:
+                    return f"of equal ones, {list(other)} is closer to the goal"
+                if self.estimate(other) == h and self.numbers.get(other, number) < number:
+                    return f"of equal ones, {list(other)} was seen first"
         return None
 
 
