@@ -170,7 +170,9 @@ def paths_told(case: Case, tally: Tally) -> None:
     if case.contract.near is None or case.contract.growth is None:
         return
     edges = case.events[Kind.EDGE]
-    moments = edges["seq"][1:] - 1
+    # A path is told at the end of an iteration, in which two trees may each have grown.
+    ends = np.diff(edges["iteration"]) > 0
+    moments = edges["seq"][1:][ends] - 1
     moments = moments if case.cut else np.append(moments, 1 << 62)
     ways = _ways(case)
     fewer = max(1, int(np.ceil(len(moments) * len(ways) / _MOMENTS)))

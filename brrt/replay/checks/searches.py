@@ -64,15 +64,20 @@ def _motions(number: Ints, keys: Ints) -> NDArray[np.uint64]:
 
 
 class _Expanded:
-    """Cells that were expanded, each once, and what was found to be blocked between them."""
+    """Cells that were expanded, each once, and what was found to be blocked between them.
+
+    Attributes:
+        born: Where each first stands among all expansions, shape (n,); cells lie in the order of
+            their places, so that neighbours are found without leaping about in memory.
+        table: Its expansion then.
+        steps: To a cell's neighbours.
+    """
 
     def __init__(self, case: Case, lattice: Lattice) -> None:
         table, rejects = case.events[Kind.EXPAND], case.events[Kind.REJECT]
         keys = _keys(indices(case, lattice, table["q"]))
-        _, first = np.unique(keys, return_index=True)
-        self.rows = np.sort(first)
-        self.table, self.keys = table[self.rows], keys[self.rows]
-        self._order = np.argsort(self.keys, kind="stable")
+        self._keys, self.born = np.unique(keys, return_index=True)
+        self.table = table[self.born]
         gone = _keys(indices(case, lattice, rejects["q"]))
         self._blocked = np.unique(_motions(rejects["node"].astype(np.int64), gone))
         dim = table["q"].shape[1]
@@ -81,14 +86,22 @@ class _Expanded:
 
     def neighbours(self, step: tuple[int, ...]) -> tuple[Ints, Flags]:
         """For each cell the row of its neighbour or -1, and whether the way there is open."""
-        delta = sum(x << _BITS * (len(step) - 1 - k) for k, x in enumerate(step))
-        wanted = self.keys + delta
-        at = np.minimum(np.searchsorted(self.keys, wanted, sorter=self._order), len(wanted) - 1)
-        other = self._order[at]
-        other = np.where(self.keys[other] == wanted, other, -1)
-        shut = np.isin(_motions(self.table["cell"].astype(np.int64), wanted), self._blocked)
-        back = _motions(self.table["cell"][other].astype(np.int64), self.keys)
-        return other, ~shut & ((other < 0) | ~np.isin(back, self._blocked))
+        wanted = self._keys + sum(x << _BITS * (len(step) - 1 - k) for k, x in enumerate(step))
+        other = np.minimum(np.searchsorted(self._keys, wanted), len(wanted) - 1)
+        other = np.where(self._keys[other] == wanted, other, -1)
+        shut = self._is_blocked(_motions(self.table["cell"].astype(np.int64), wanted))
+        back = _motions(self.table["cell"][other].astype(np.int64), self._keys)
+        return other, ~shut & ((other < 0) | ~self._is_blocked(back))
+
+    def _is_blocked(self, motions: NDArray[np.uint64]) -> Flags:
+        if not len(self._blocked):
+            return np.zeros(len(motions), bool)
+        at = np.minimum(np.searchsorted(self._blocked, motions), len(self._blocked) - 1)
+        return np.asarray(self._blocked[at] == motions)
+
+    def in_order(self) -> Ints:
+        """Rows in the order in which they were expanded."""
+        return np.argsort(self.born)
 
 
 def shortest_ways(case: Case, tally: Tally) -> None:
@@ -100,16 +113,18 @@ def shortest_ways(case: Case, tally: Tally) -> None:
     if lattice is None or lattice.lookahead is not None or not len(case.events[Kind.EXPAND]):
         return
     cells = _Expanded(case, lattice)
-    cost, rows = np.asarray(cells.table["cost"]), np.arange(len(cells.table))
+    cost = np.asarray(cells.table["cost"])
     least = np.full(len(cost), np.inf)
     for step in cells.steps:
         other, is_open = cells.neighbours(step)
-        there = is_open & (other >= 0) & (other < rows)
+        there = is_open & (other >= 0) & (cells.born[other] < cells.born)
         through = cost[other] + lattice.epsilon * sum(map(abs, step)) ** 0.5
         least = np.where(there, np.minimum(least, through), least)
+    order = cells.in_order()
+    table, cost, least = cells.table[order], cost[order], least[order]
     tally.look(
-        cells.table, ~case.at_most(cost, least),
-        lambda i: f"cell {cells.table['cell'][i]} costs {cost[i]:.12g}; {least[i]:.12g} is a way",
+        table, ~case.at_most(cost, least),
+        lambda i: f"cell {table['cell'][i]} costs {cost[i]:.12g}; {least[i]:.12g} is a way",
     )  # fmt: skip
 
 
@@ -123,9 +138,11 @@ def nothing_left(case: Case, tally: Tally) -> None:
     for step in cells.steps:
         other, is_open = cells.neighbours(step)
         wrong |= is_open & (other < 0)
+    order = cells.in_order()
+    table = cells.table[order]
     tally.look(
-        cells.table, wrong,
-        lambda i: f"cell {cells.table['cell'][i]} has a neighbour that nobody looked at",
+        table, wrong[order],
+        lambda i: f"cell {table['cell'][i]} has a neighbour that nobody looked at",
     )  # fmt: skip
 
 
