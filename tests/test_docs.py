@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from brrt.recording import drive
+from brrt.replay.checks import RULES
 
 from .conftest import Result
 
@@ -57,6 +58,14 @@ def test_readme_commands_and_code(
             continue  # a test file, which tests/test_pytest_plugin.py runs
         exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own text
         assert capfd.readouterr().out
+
+
+def test_promises_page_names_every_rule() -> None:
+    """And no rule that there is not."""
+    page = (ROOT / "docs/promises.md").read_text()
+    table = [line.rpartition(" | ")[2] for line in page.splitlines() if line.startswith("| ")]
+    named = {name for cell in table for name in re.findall("`([^`]+)`", cell)}
+    assert named == {rule.__name__.replace("_", " ") for rule in RULES}
 
 
 def test_events_page_is_up_to_date() -> None:
