@@ -159,7 +159,7 @@ def test_cut_file_gives_its_whole_chunks(tmp_path: Path) -> None:
                         params={"goal_bias": 0.0, "step": 0.1}, clock="logical")  # fmt: skip
     _, log = write(path, scenario, batch=10_000)
     whole, saved = path.read_bytes(), []
-    for cut in range(len(whole) - 1, 3000, -len(whole) // 23):
+    for cut in range(len(whole) - 1, 3000, -len(whole) // 11):
         path.write_bytes(whole[:cut])
         recording, batches = read(path), list[Events]()
         with pytest.raises(CutError, match="cut at byte"):
