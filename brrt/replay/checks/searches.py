@@ -158,7 +158,9 @@ def goal_taken(case: Case, tally: Tally) -> None:
     clear = all_clear(case.obstacles, case.robot, a, np.broadcast_to(case.goal, a.shape))
     ends = np.append(table["seq"][1:], 1 << 62)[near]
     moves = case.events[Kind.MOVE]
-    taken = moves["seq"][(np.asarray(moves["q"]) == case.goal).all(axis=1)]
+    # From a cell at the goal there is no move to make; the path is told all the same.
+    moved = moves["seq"][(np.asarray(moves["q"]) == case.goal).all(axis=1)]
+    taken = np.sort(np.concatenate([moved, case.events[Kind.PATH]["seq"]]))
     next_ = np.append(taken, 1 << 61)[np.searchsorted(taken, some["seq"])]
     wrong = clear & (ends < 1 << 62) & (next_ > ends)
     tally.look(
