@@ -76,7 +76,10 @@ def nursery() -> None:
     for line in sys.stdin:
         child = os.fork()
         if not child:
-            record(ENDLESS, Path(line.strip()))
+            try:
+                record(ENDLESS, Path(line.strip()))
+            finally:
+                os._exit(1)  # it is to be killed; what it says now nobody may take for us
         print(child, flush=True)
         os.waitpid(child, 0)
         print("gone", flush=True)
