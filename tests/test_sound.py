@@ -11,11 +11,13 @@ from brrt.recording.sound import Numbering
 
 @pytest.fixture(scope="module")
 def lrta() -> Events:
+    """Give the log of a search."""
     return _log("lrta-star")
 
 
 @pytest.fixture(scope="module")
 def rrt() -> Events:
+    """Give the log of a tree planner."""
     return _log("rrt")
 
 
@@ -36,6 +38,7 @@ def _take(events: Events, kind: Kind, name: str, value: Any) -> None:
 
 
 def test_sound_logs_pass(rrt: Events, lrta: Events) -> None:
+    """What planners write is sound; so is an estimate without an end."""
     Numbering().take(rrt)
     Numbering().take(lrta)
     _take(lrta, Kind.HEURISTIC, "h", np.inf)  # a cell without a way out
@@ -60,10 +63,12 @@ def test_sound_logs_pass(rrt: Events, lrta: Events) -> None:
     ],
 )
 def test_impossible_values(rrt: Events, kind: Kind, name: str, value: Any) -> None:
+    """The message names the event, the kind, the field and the value."""
     with pytest.raises(BrrtError, match=rf"^event \S+: {kind.label} has {name} = "):
         _take(rrt, kind, name, value)
 
 
 def test_impossible_estimate(lrta: Events) -> None:
+    """Infinite is an estimate, not a number is none."""
     with pytest.raises(BrrtError, match="heuristic has h = nan"):
         _take(lrta, Kind.HEURISTIC, "h", np.nan)
