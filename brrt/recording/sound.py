@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, Table
-from brrt.scenario import Manifest
+from brrt.manifest import Manifest
 from brrt.worlds.convex import GREATEST
 from brrt.worlds.loaders.loader import MOST_LISTS
 from brrt.worlds.world import World
