@@ -8,7 +8,6 @@ import numpy as np
 
 from brrt import branch
 from brrt.branch import Recorded
-from brrt.events import Status
 from brrt.manifest import Branch, Manifest
 from brrt.retrace import Anew, Onward, proved
 from brrt.run import Run, Solver, made_by
@@ -64,9 +63,10 @@ class BranchedRun(_Again):
         iteration, ended = branch.branching_point(recording, until)
         before = recording.manifest.ruling(iteration)
         scenario = branch.changed(before, params or {}, seed, settings or {})
-        planner = branch.tree_planner(scenario)
-        if ended is Status.SOLVED:
-            branch.check_open(recording, iteration, planner)
+        planner = branch.loop_planner(scenario)
+        parent = branch.loop_planner(before.scenario)
+        branch.check_settled(parent, planner)
+        branch.check_open(recording, iteration, ended, parent, planner)
         self._set_up_again(before, scenario, recording.world, planner, batch)
         shared = branch.Shared(recording, iteration)
         drive = proved(shared, before, self.problem, self._rng, self._log, made_by())
