@@ -38,8 +38,9 @@ class Saved:
             saved = f"{counted(self.events, 'event')} up to {last / 1e9:.6f} s {verb} whole"
             if not self._partial:
                 raise RecordingError(
-                    f"{error}; {saved}: {self._verb} with --partial, or save them with brrt recover"
+                    f"{error.fault}; {saved}: {self._verb} with --partial, or save them with brrt "
+                    "recover"
                 ) from None
             if not self.cut:  # it may be read more than once
-                note(f"{error}; {saved}")
+                note(f"{error.fault}; {saved}")
             self.cut = True

@@ -1,9 +1,13 @@
 """Recordings: sinks that write them, and `read` for what they wrote."""
 
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial as bound
 from pathlib import Path
 
-from brrt.errors import RecordingError
+from brrt.errors import BrrtError, RecordingError
+from brrt.events import Events
 from brrt.recording.container import MAGIC
 from brrt.recording.mcap_reader import read_mcap
 from brrt.recording.mcap_writer import McapSink
@@ -14,13 +18,34 @@ from brrt.recording.sound import CutError
 _RRD = b"RRF"
 
 
-def read(path: Path | str) -> Recording:
+def read(path: Path | str, *, partial: bool = False) -> Recording:
     """Open a recording, MCAP or Rerun, told apart by how the file begins.
+
+    Args:
+        path: The file.
+        partial: Take what is whole of a file that was cut; otherwise `CutError` is raised where
+            the cut is met. A recording whose `result` is None ends ahead of its run's end.
 
     Raises:
         RecordingError: The file cannot be read, or is not a recording of brrt.
     """
-    path = Path(path)
+    recording = _opened(path)
+    if partial:
+        return replace(recording, batches=bound(_whole_part, recording.batches))
+    return recording
+
+
+def _whole_part(batches: Callable[[], Iterator[Events]]) -> Iterator[Events]:
+    """Yield the events that stand ahead of a cut."""
+    with suppress(CutError):
+        yield from batches()
+
+
+def _opened(given: Path | str) -> Recording:
+    try:
+        path = Path(given)
+    except TypeError:
+        raise BrrtError(f"read takes the name of a file, not {type(given).__name__}") from None
     try:
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))

@@ -22,7 +22,7 @@ from brrt.recording.mcap_end import LABELS, ending, figures_of
 from brrt.recording.mcap_records import opened, parsed, records_of
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
-from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head
+from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head, nothing_whole
 
 _ANY, _TIMES = 1 << 20, 256
 """Of what a chunk unpacks to: bytes in any case, and times its size; events come to 15 times."""
@@ -60,14 +60,19 @@ def read_mcap(path: Path) -> Recording:
                     return Recording(manifest, world, batches, result, counts)
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
-    raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
+    missing = f"metadata {RUN}" if texts is None else f"attachment {WORLD}"
+    raise RecordingError(
+        f"{path}: an MCAP file, but no {missing} stands ahead of its first chunk: not a recording "
+        f"of brrt, or one that another tool rewrote; read the file that it was made of, or let the "
+        f"tool write metadata {RUN} and then attachment {WORLD} first"
+    )
 
 
 def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     try:
         yield from records_of(path, file, check_end=False)
     except CutError as error:
-        raise CutError(f"{error}, ahead of the first event: there is nothing to save") from None
+        raise nothing_whole(error) from None
 
 
 @dataclass(slots=True)
@@ -279,4 +284,4 @@ def _batches(path: Path, manifest: Manifest) -> Iterator[Events]:
         except CutError as error:
             if chunk is not None:
                 yield decoder.events(chunk, index)
-            raise CutError(str(error), figures) from None
+            raise CutError(error.fault, figures) from None

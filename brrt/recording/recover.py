@@ -99,7 +99,7 @@ def _copy(recording: Recording, sink: Any) -> Recovery:
         try:
             batch = next(batches, None)
         except CutError as error:
-            lost, ended, batch = str(error), error.result is not None, None
+            lost, ended, batch = error.fault, error.result is not None, None
         except RecordingError as error:
             lost, ended, batch = str(error), False, None
         if batch is None:

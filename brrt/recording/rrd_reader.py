@@ -21,7 +21,7 @@ from brrt.manifest import Manifest
 from brrt.recording.recording import Recording
 from brrt.recording.rrd_frames import opened, unpacked
 from brrt.recording.rrd_outline import END, MANIFEST, WORLD, Outline, reason
-from brrt.recording.sound import CutError, Numbering, head
+from brrt.recording.sound import CutError, Numbering, head, nothing_whole
 
 pa: Any = pyarrow  # mypy knows none of its names
 
@@ -46,7 +46,7 @@ def read_rerun(path: Path, *, in_parts: bool = False) -> Recording:
     outline = Outline.of(path, in_parts=in_parts)
     if MANIFEST not in outline.texts or WORLD not in outline.texts:
         if isinstance(outline.stopped, CutError):
-            raise CutError(f"{outline.stopped}, ahead of the first event: there is nothing to save")
+            raise nothing_whole(outline.stopped)
         raise outline.stopped or RecordingError(
             f"{path}: a Rerun file, but not a recording of brrt (no {MANIFEST})"
         )
@@ -207,7 +207,7 @@ def _check_end(
             f"{outline.path}: damaged: {stated} events were written, {count} are there"
         )
     if isinstance(outline.stopped, CutError):
-        raise CutError(str(outline.stopped), figures)
+        raise CutError(outline.stopped.fault, figures)
     if outline.stopped is not None:
         raise outline.stopped
     if missing or stated is None:

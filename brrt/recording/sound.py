@@ -27,12 +27,25 @@ class CutError(RecordingError):
     """The file ends before its end; what stands before the cut was delivered.
 
     Attributes:
+        fault: What is wrong, without the remedy: on the command line it is another one.
         result: The run's figures, where they stand before the cut: then no event is missing.
     """
 
-    def __init__(self, message: str, result: Mapping[str, Any] | None = None) -> None:
-        super().__init__(message)
-        self.result = result
+    def __init__(
+        self,
+        fault: str,
+        result: Mapping[str, Any] | None = None,
+        *,
+        remedy: str = "brrt.read(path, partial=True) takes what is whole",
+    ) -> None:
+        super().__init__("; ".join(filter(None, (fault, remedy))))
+        self.fault, self.result = fault, result
+
+
+def nothing_whole(cut: CutError) -> CutError:
+    """Return the error for a file that is cut so early that nothing of it is of use."""
+    fault = f"{cut.fault}, ahead of the first event: there is nothing to save"
+    return CutError(fault, remedy="")
 
 
 class DamagedError(RecordingError):
