@@ -86,8 +86,7 @@ class Scenario:
         for name in ("start", "goal"):
             if isinstance(getattr(self, name), str):
                 object.__setattr__(self, name, _configuration(name, getattr(self, name)))
-        if not names_robot_file(self.robot):
-            make_robot(self.robot)
+        object.__setattr__(self, "robot", _robot(self.robot))
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
         self._check_numbers()
@@ -235,6 +234,18 @@ class Scenario:
         return Problem(world, robot, start, goal)
 
 
+def _robot(spec: str) -> str:
+    """Return the name of a robot, so that a file's is known for one even when the file is gone.
+
+    Raises:
+        BrrtError: There is no such robot.
+    """
+    if not names_robot_file(spec):
+        make_robot(spec)
+        return spec
+    return spec if "/" in spec or spec.endswith(".json") else f"./{spec}"
+
+
 def _positive(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < np.inf
 
@@ -364,6 +375,15 @@ class Manifest:
             BrrtError: Its definition is damaged.
         """
         return self.scenario.make_robot() if self.robot is None else robot_from_json(self.robot)
+
+    def make_problem(self, world: World) -> Problem:
+        """Put the recorded query and robot into the recorded world, even where files are gone.
+
+        Raises:
+            BrrtError: The query is of no use in the world, or the robot's definition is damaged.
+        """
+        query = replace(self.scenario, start=self.start, goal=self.goal)
+        return query.make_problem(world, self.make_robot())
 
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
