@@ -36,7 +36,8 @@ class McapSink:
     """Writes every event, in order, to an MCAP file that stock tools read.
 
     Manifest and world come first, so that a cut file keeps them; the figures come last. A chunk
-    is on its way to the disk at the latest a second after its first event was written.
+    is written at the latest by the first batch that comes half a second after its first event; in
+    a `Background`, as `brrt plan` has it, that is so though the planner falls silent.
 
     Args:
         path: The file; it is overwritten.

@@ -33,7 +33,8 @@ a chunk begins with the same offsets, 4 bytes a row, which so take no space but 
 class RerunSink:
     """Writes every event, exactly, to an .rrd file or a live viewer, and draws what happens.
 
-    Manifest and world come first; if the run ended well, its figures come last.
+    Manifest and world come first; if the run ended well, its figures come last. What waits to be
+    written does not do so for long, as in `McapSink`.
 
     Args:
         manifest: The run's.

@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Kind, Table
+from brrt.events import Events
+from brrt.replay.possible import check_possible
 from brrt.scenario import Manifest
-from brrt.worlds.convex import GREATEST
 from brrt.worlds.loaders.loader import MOST_LISTS
 from brrt.worlds.world import World
 
@@ -18,9 +17,6 @@ MOST_BYTES = 1 << 28
 """Bytes that one piece of a file may hold: a length that lies must not exhaust the memory."""
 
 _MOST_DOF = 4096
-
-_LONGEST = 1 << 60
-"""Nanoseconds of a run, 36 years, and iterations."""
 
 
 class CutError(RecordingError):
@@ -78,10 +74,6 @@ def _together(manifest: Manifest, world: World) -> None:
             raise BrrtError(f"damaged: its robot needs {dof} numbers, and not {manifest.dof}")
 
 
-_SEEN = 27
-"""Cells of a lattice that an event may be the first to show: the one it expands, and all around."""
-
-
 class Numbering:
     """Sees that batches go on where the one before ended, and that no event is missing.
 
@@ -109,49 +101,5 @@ class Numbering:
             present[places] = True
         if not present.all():
             raise BrrtError("events are there twice, others not at all")
-        for kind, table in events.tables.items():
-            _possible(kind, table, self.next + n)
+        check_possible(events, self.next + n)
         self.next += n
-
-
-def _possible(kind: Kind, table: Table, count: int) -> None:
-    """See that every value is one that a planner can mean; whether it is right is for the checks.
-
-    Args:
-        kind: Of the events.
-        table: The events.
-        count: Events of the log so far, these included: there are no more nodes.
-
-    Raises:
-        BrrtError: One is not.
-    """
-    _hold(kind, "t", table, (table["t"] < 0) | (table["t"] > _LONGEST))
-    _hold(kind, "iteration", table, (table["iteration"] < 0) | (table["iteration"] > _LONGEST))
-    for field in FIELDS[kind]:
-        values = table[field.name]
-        if field.choices is not None:
-            wrong = ~np.isin(values, list(field.choices))
-        elif field.type == "q[]":
-            wrong = np.array([not (len(rows) and _finite(rows).all()) for rows in values], np.bool_)
-        elif field.type == "q":
-            wrong = np.asarray(~_finite(values).all(axis=1))
-        elif field.type == "float64":
-            wrong = ~_finite(values)
-            if field.name == "h":  # where there is no way out
-                wrong &= values != np.inf
-        elif field.type == "int32":
-            wrong = (values < -1) | (values >= _SEEN * count)
-        else:
-            continue
-        _hold(kind, field.name, table, wrong)
-
-
-def _finite(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(values) <= GREATEST)
-
-
-def _hold(kind: Kind, name: str, table: Table, wrong: NDArray[np.bool_]) -> None:
-    if wrong.any():
-        event = table[int(wrong.argmax())]
-        value = " ".join(str(event[name]).split())[:60]
-        raise BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}")
