@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from brrt import Events, McapSink, RecordingError, Scenario, first_difference, read
+from brrt.recording.mcap_records import SEAL
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import FRAME
 from brrt.recording.rrd_outline import Outline
@@ -72,6 +73,7 @@ class Forger:
         with path.with_name("true.mcap").open("rb") as file:
             reader = make_reader(file)
             (self.run,) = [m.metadata for m in reader.iter_metadata() if m.name == "brrt.run"]
+            del self.run[SEAL]  # who forges a manifest can forge that, too
             (world,) = reader.iter_attachments()
             self.world = world.data
             found: list[tuple[Any, Any, Any]] = list(reader.iter_messages())
@@ -233,6 +235,24 @@ def frames_of(data: bytes) -> list[tuple[int, int, int]]:
         found.append((opcode, at, length + 9))
         at += length + 9
     return found
+
+
+@pytest.mark.parametrize("what", ["brrt.run", "world.json", "brrt.result"])
+def test_head_and_figures_have_checksums_of_their_own(what: str, tmp_path: Path) -> None:
+    """A letter of the manifest, the world or the figures is another: seen before any event is."""
+    path = tmp_path / "x.mcap"
+    write(path)
+    data, texts = bytearray(path.read_bytes()), {"brrt.run": b'"seed": 1', "world.json": b"circ"}
+    text = texts.get(what, b'"iteration limit"')
+    at = data.index(text, data.index(what.encode()))
+    data[at + len(text) - 2] ^= 1
+    path.write_bytes(data)
+    if what == "brrt.result":
+        assert read(path).result is None
+        assert "checksum of brrt.result does not match" in told(path)
+    else:
+        with pytest.raises(RecordingError, match=f"the checksum of {what} does not match"):
+            read(path)
 
 
 def varint(value: int) -> bytes:

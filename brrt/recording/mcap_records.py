@@ -1,8 +1,9 @@
 """What an MCAP file is made of: records, read from the front into bounded memory."""
 
+import json
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
@@ -16,6 +17,8 @@ from brrt.recording.container import MAGIC
 from brrt.recording.sound import MOST_BYTES, CutError
 
 _BLOCK = 1 << 20
+SEAL = "crc32"
+"""Name of the text that is the checksum of the others."""
 FOOTER = 29
 """Bytes of the footer's record."""
 
@@ -47,6 +50,41 @@ def parsed(path: Path, kind: Any, data: bytes) -> Any:
         return kind.read(ReadDataStream(BytesIO(data)))
     except Exception as error:  # noqa: BLE001 - mcap raises whatever a damaged length leads to
         raise RecordingError(f"{path}: damaged {kind.__name__}: {error}") from None
+
+
+def sealed(texts: Mapping[str, str]) -> dict[str, str]:
+    """Add a checksum to named texts: of Metadata, MCAP has none but that of all the data."""
+    return {**texts, SEAL: _seal(texts)}
+
+
+def metadata_of(path: Path, data: bytes) -> records.Metadata:
+    """Read named texts from their record; their checksum, if they have one, is seen to and gone.
+
+    Raises:
+        RecordingError: They are damaged.
+    """
+    metadata: records.Metadata = parsed(path, records.Metadata, data)
+    stated = metadata.metadata.pop(SEAL, None)
+    if stated is not None and stated != _seal(metadata.metadata):
+        raise RecordingError(f"{path}: damaged: the checksum of {metadata.name} does not match")
+    return metadata
+
+
+def _seal(texts: Mapping[str, str]) -> str:
+    return str(zlib.crc32(json.dumps(sorted(texts.items())).encode()))
+
+
+def attachment_of(path: Path, data: bytes) -> records.Attachment:
+    """Read an attachment from its record.
+
+    Raises:
+        RecordingError: It is damaged.
+    """
+    attachment: records.Attachment = parsed(path, records.Attachment, data)
+    stated = struct.unpack("<I", data[-4:])[0]
+    if stated and stated != zlib.crc32(data[:-4]):  # 0 is for none
+        raise RecordingError(f"{path}: damaged: the checksum of {attachment.name} does not match")
+    return attachment
 
 
 def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tuple[int, bytes]]:

@@ -15,6 +15,7 @@ from brrt.events import FIELDS, Events, Kind
 from brrt.recording.cdr import Layout, definition
 from brrt.recording.container import Container
 from brrt.recording.gathering import Gathering
+from brrt.recording.mcap_records import sealed
 from brrt.replay.metrics import Metrics
 from brrt.scenario import Manifest
 from brrt.worlds.world import World
@@ -57,7 +58,7 @@ class McapSink:
         try:
             self._file = Container(self._path, library)
             self._file.declare(*_schemas(manifest.dof), *_channels())
-            self._file.metadata(RUN, manifest.to_strings())
+            self._file.metadata(RUN, sealed(manifest.to_strings()))
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
             self._file.flush()
         except OSError as error:
@@ -87,7 +88,7 @@ class McapSink:
                 if whole:
                     figures = self._metrics.as_dict()
                     texts = {name: json.dumps(value) for name, value in figures.items()}
-                    self._file.metadata(RESULT, texts)
+                    self._file.metadata(RESULT, sealed(texts))
                 self._file.finish()
         finally:
             with self._failing():
