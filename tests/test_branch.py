@@ -24,8 +24,8 @@ from brrt import (
 )  # fmt: skip
 from brrt.branch import last_whole_iteration
 from brrt.events import Events, Phase, Status
+from brrt.manifest import Manifest
 from brrt.run import Run
-from brrt.scenario import Manifest
 
 from . import naive, test_rrt
 from .conftest import Result, recorded

@@ -8,8 +8,8 @@ import numpy as np
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events
+from brrt.manifest import Manifest
 from brrt.replay.possible import check_possible
-from brrt.scenario import Manifest
 from brrt.worlds.loaders.loader import MOST_LISTS
 from brrt.worlds.world import World
 

@@ -1,12 +1,13 @@
 """What an event can say: told of what a planner emits, and of what a file is read to hold."""
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.events import FIELDS, EnumClass, Events, Kind, Table
+from brrt.events import FIELDS, Events, Kind, Table
 from brrt.worlds.convex import GREATEST
 
 _LONGEST = 1 << 60
@@ -31,45 +32,44 @@ def check_possible(events: Events, count: int) -> None:
 
 
 def _check(kind: Kind, table: Table, count: int) -> None:
-    _hold(kind, "t", table, (table["t"] < 0) | (table["t"] > _LONGEST))
-    _hold(kind, "iteration", table, (table["iteration"] < 0) | (table["iteration"] > _LONGEST))
+    _hold(kind, "t", table, 0, _LONGEST)
+    _hold(kind, "iteration", table, 0, _LONGEST)
     for field in FIELDS[kind]:
-        values = table[field.name]
         if field.choices is not None:
-            wrong = ~np.isin(values, list(field.choices))
+            # Enumerations count from 0 without a gap.
+            _hold(kind, field.name, table, 0, len(field.choices) - 1)
         elif field.type == "q[]":
-            wrong = np.array([not (len(rows) and _finite(rows).all()) for rows in values], np.bool_)
-        elif field.type == "q":
-            wrong = np.asarray(~_finite(values).all(axis=1))
-        elif field.type == "float64":
-            wrong = ~_finite(values)
-            if field.name == "h":  # where there is no way out
-                wrong &= values != np.inf
+            for at, rows in enumerate(table[field.name]):
+                if not len(rows) or _beyond(rows, -GREATEST, GREATEST).any():
+                    raise _impossible(kind, field.name, table[at])
+        elif field.type in ("q", "float64"):
+            # An estimate is infinite where there is no way out.
+            most = np.inf if field.name == "h" else GREATEST
+            _hold(kind, field.name, table, -GREATEST, most)
         elif field.type == "int32":
-            wrong = (values < -1) | (values >= _SEEN * count)
-        else:
-            continue
-        _hold(kind, field.name, table, wrong, field.choices)
+            _hold(kind, field.name, table, -1, _SEEN * count - 1)
 
 
-def _finite(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(values) <= GREATEST)
+def _hold(kind: Kind, name: str, table: Table, least: float, most: float) -> None:
+    values = table[name]
+    # Two passes without a mask in the usual case; they are false of what is not a number, too.
+    if len(values) and not (values.min() >= least and values.max() <= most):
+        wrong = _beyond(values, least, most)
+        raise _impossible(kind, name, table[int(wrong.argmax())])
 
 
-def _hold(
-    kind: Kind,
-    name: str,
-    table: Table,
-    wrong: NDArray[np.bool_],
-    choices: EnumClass | None = None,
-) -> None:
-    if wrong.any():
-        event = table[int(wrong.argmax())]
-        value = " ".join(str(event[name]).split())[:60]
-        there = "" if choices is None else f"; there is {', '.join(map(told, choices))}"
-        raise BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}{there}")
+def _beyond(values: NDArray[Any], least: float, most: float) -> NDArray[np.bool_]:
+    """Return which of n events have a number that is out of range or none, shape (n,)."""
+    inside = (values >= least) & (values <= most)
+    return np.asarray(~inside.reshape(len(values), -1).all(axis=1))
 
 
-def told(choice: IntEnum) -> str:
-    """Return a choice as number and name."""
+def _impossible(kind: Kind, name: str, event: np.void) -> BrrtError:
+    value = " ".join(str(event[name]).split())[:60]
+    choices = next((f.choices for f in FIELDS[kind] if f.name == name and f.choices), ())
+    there = f"; there is {', '.join(map(_told, choices))}" if choices else ""
+    return BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}{there}")
+
+
+def _told(choice: IntEnum) -> str:
     return f"{choice.value} ({choice.name.lower().replace('_', ' ')})"

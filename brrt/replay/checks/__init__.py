@@ -13,6 +13,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from brrt.events import Events
+from brrt.manifest import Manifest
 from brrt.planners.contract import Contract
 from brrt.replay.checks import (
     draws,
@@ -28,7 +29,6 @@ from brrt.replay.checks import (
 )
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.tally import Finding, Tally
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 Rule = Callable[[Case, Tally], Windows | None]
