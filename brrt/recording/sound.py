@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import Events
+from brrt.events import LATEST_NS, Events
 from brrt.manifest import Manifest
 from brrt.replay.possible import check_possible
 from brrt.worlds.loaders.loader import MOST_LISTS
@@ -64,7 +64,7 @@ def _together(manifest: Manifest, world: World) -> None:
     for name, q in (("start", manifest.start), ("goal", manifest.goal)):
         if len(q) != manifest.dof:
             raise BrrtError(f"damaged: {name} has {len(q)} numbers, and not {manifest.dof}")
-    if not 0 <= manifest.epoch_ns < 1 << 62:
+    if not 0 <= manifest.epoch_ns <= LATEST_NS:
         raise BrrtError(f"damaged: it began {manifest.epoch_ns} ns after 1970")
     if manifest.dim != world.dim:
         raise BrrtError(f"damaged: its world is {world.dim}D, and not {manifest.dim}D")
