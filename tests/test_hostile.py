@@ -14,13 +14,13 @@ from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from brrt import Events, McapSink, RecordingError, Scenario, first_difference, read
+from brrt import Events, Kind, McapSink, RecordingError, Scenario, first_difference, read
 from brrt.recording.mcap_records import SEAL
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import FRAME
 from brrt.recording.rrd_outline import Outline
 
-from .conftest import recorded
+from .conftest import Result, recorded
 
 SCENARIO = Scenario(world="circles2d:n=9", seed=1, clock="logical", iterations=60)
 pa: Any = pyarrow  # mypy knows none of its names
@@ -28,15 +28,15 @@ NAME = "brrt.phase:name"
 LITTLE = 64 << 20
 
 
-def write(path: Path) -> Events:
-    """Record a run; return its log."""
+def write(path: Path, events: Events | None = None) -> Events:
+    """Record a run, or other events in its name; return its log."""
     run, log = recorded(SCENARIO)
     sink: Any
     if path.suffix == ".rrd":
         sink = RerunSink(run.manifest, run.problem.world, path=path)
     else:
         sink = McapSink(path, run.manifest, run.problem.world)
-    sink.write(log)
+    sink.write(log if events is None else events)
     sink.close(whole=True)
     return log
 
@@ -253,6 +253,33 @@ def test_head_and_figures_have_checksums_of_their_own(what: str, tmp_path: Path)
     else:
         with pytest.raises(RecordingError, match=f"the checksum of {what} does not match"):
             read(path)
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_events_that_contradict_each_other(
+    ending: str, brrt: Callable[..., Result], tmp_path: Path
+) -> None:
+    """Of a log that makes no tree nothing is told but that, with the name of its file."""
+    log, path = write(tmp_path / f"bad{ending}"), f"bad{ending}"
+    for name, value in (("parent", 50), ("parent", 5), ("node", 7), ("iteration", 1 << 59)):
+        edges = log[Kind.EDGE].copy()
+        edges[name][5] = value
+        write(tmp_path / path, Events(log.dof, {**log.tables, Kind.EDGE: edges}))
+        for command in (
+            ("replay", path), ("replay", path, "--node", "5"), ("explain", path),
+            ("plot", path, "--out", "x.png", "--dpi", "40"),
+            ("export", path, "--foxglove", "x.mcap", "--force"),
+        ):  # fmt: skip
+            done = brrt(*command)
+            if done.code == 0:
+                assert done.out
+                assert name == "iteration" or command[0] in ("explain", "export"), command
+                continue
+            assert (done.code, done.out, done.err.count("\n")) == (2, "", 1), (command, done.err)
+            assert done.err.startswith(f"brrt: {path}: ")
+            assert done.err.endswith("; see brrt verify\n")
+        assert brrt("verify", path).code == 1
+        Path("x.png").unlink(missing_ok=True)
 
 
 def varint(value: int) -> bytes:

@@ -89,9 +89,9 @@ class _Decoder:
     channels: dict[int, _Channel] = field(default_factory=dict)
 
     def damaged(self, why: str) -> RecordingError:
-        return RecordingError(
-            f"{self.path}: damaged after event {self.numbering.next - 1:,}: {why}"
-        )
+        last = self.numbering.next - 1
+        place = "ahead of the first event" if last < 0 else f"after event {last:,}"
+        return RecordingError(f"{self.path}: damaged {place}: {why}")
 
     def index(self, data: bytes) -> tuple[int, NDArray[np.uint64]]:
         """Read where a channel's messages are in the chunk ahead."""
