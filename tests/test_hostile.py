@@ -1,5 +1,6 @@
 """Recordings that were made to do harm: refused in one line, soon, and with little memory."""
 
+import os
 import struct
 import tracemalloc
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from brrt import Events, Kind, McapSink, RecordingError, Scenario, first_difference, read
+from brrt.recording.container import MAGIC
 from brrt.recording.mcap_records import SEAL
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import FRAME
@@ -280,6 +282,28 @@ def test_events_that_contradict_each_other(
             assert done.err.endswith("; see brrt verify\n")
         assert brrt("verify", path).code == 1
         Path("x.png").unlink(missing_ok=True)
+
+
+def test_what_is_no_file(brrt: Callable[..., Result], tmp_path: Path) -> None:
+    """Folders, pipes, devices, loops of links, and nothing at all: one line, at once."""
+    Path("folder").mkdir()
+    os.mkfifo("pipe")
+    Path("loop").symlink_to("loop")
+    Path("zeros").symlink_to("/dev/zero")
+    Path("empty").touch()
+    Path("latin").write_bytes(b"\xff\xfe\x00")
+    Path("short").write_bytes(MAGIC)
+    Path("blank").write_bytes(MAGIC + bytes(10_000_000))
+    Path("barren").write_bytes(MAGIC + (b"\x90" + bytes(8)) * 200_000)
+    for name in "folder pipe loop zeros empty latin short blank barren missing".split():
+        for command in (
+            ("replay", name),
+            ("recover", name, "--out", "x.mcap"),
+            ("diff", name, "x"),
+        ):
+            done = brrt(*command)
+            assert (done.code, done.out, done.err.count("\n")) == (2, "", 1), command
+            assert done.err.startswith(f"brrt: {name}: ")
 
 
 def varint(value: int) -> bytes:

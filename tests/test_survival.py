@@ -332,6 +332,27 @@ def test_what_a_cut_leaves_is_never_called_broken(
     assert {0, len(log)} <= found
 
 
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_power_cut_that_leaves_zeros(ending: str, brrt: Command, tmp_path: Path) -> None:
+    """A file may have its length and not its content: what follows the last batch is a cut."""
+    path = tmp_path / f"run{ending}"
+    run, log = recorded(SCENARIO, batch=100)
+    sink = new_sink(path, run)
+    sink.write(part(log, 0, 300))
+    data = path.read_bytes()
+    sink.close(whole=False)
+    for size in (1 << 12, 1 << 24):
+        for keep in (len(data), len(data) - 20):
+            path.write_bytes(data[:keep] + bytes(size))
+            found = recover(path, tmp_path / "whole.mcap")
+            assert found.lost is not None
+            assert begins(log, read(tmp_path / "whole.mcap").events())
+            if keep == len(data):
+                assert found.events == 300
+                done = brrt("replay", path.name, "--partial", "--json")
+                assert (done.code, done.json["events"]) == (0, 300)
+
+
 def first_event(path: Path) -> int:
     """Return the byte near which a file's events begin."""
     if path.suffix == ".rrd":

@@ -17,6 +17,8 @@ from brrt.recording.container import MAGIC
 from brrt.recording.sound import MOST_BYTES, CutError
 
 _BLOCK = 1 << 20
+_MOST_BARREN = 1 << 17
+"""Records between two chunks: there are 65,536 channels, and each may have an index."""
 SEAL = "crc32"
 """Name of the text that is the checksum of the others."""
 FOOTER = 29
@@ -99,12 +101,19 @@ def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tupl
         CutError: The file ends before that.
         RecordingError: It is damaged.
     """
-    crc = zlib.crc32(MAGIC)
+    crc, barren = zlib.crc32(MAGIC), 0
     while True:
         head = file.read(9)
         if len(head) < 9:
             raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
         opcode, length = struct.unpack("<BQ", head)
+        if not any(head):  # a disk that lost its power may fill up what it did not write
+            raise CutError(f"{path}: the file is cut at byte {file.tell() - 9:,}: zeros follow")
+        barren = 0 if opcode == Opcode.CHUNK else barren + 1
+        if barren > _MOST_BARREN:
+            raise RecordingError(
+                f"{path}: damaged near byte {file.tell():,}: {barren:,} records without an event"
+            )
         if length > MOST_BYTES:
             raise RecordingError(
                 f"{path}: damaged near byte {file.tell():,}: a record of {length} bytes"
