@@ -64,13 +64,20 @@ class BranchedRun(_Again):
         iteration, ended = branch.branching_point(recording, until)
         before = recording.manifest.ruling(iteration)
         scenario = branch.changed(before, params or {}, seed, settings or {})
-        planner = branch.tree_planner(scenario)
-        if ended is Status.SOLVED:
-            branch.check_open(recording, iteration, planner)
+        planner = branch.loop_planner(scenario)
+        parent = branch.loop_planner(before.scenario)
+        branch.check_settled(parent, planner)
+        # Who changes only what follows planning wants planning to end once more as it did.
+        later = ended is not None and seed is None and branch.plans_alike(before.scenario, scenario)
+        if later and ended is Status.SOLVED and before.ruling(iteration - 1) == before:
+            iteration -= 1
+        else:
+            branch.check_open(recording, iteration, ended, parent, planner)
         self._set_up_again(before, scenario, recording.world, planner, batch)
         shared = branch.Shared(recording, iteration)
         drive = proved(shared, before, self.problem, self._rng, self._log, made_by())
-        branch.check_budget(recording, drive, shared.t, self.stop)
+        if not later:
+            branch.check_budget(recording, drive, shared.t, self.stop)
         drive.turn(planner.loop(self.problem, self.stop), seed)
         self._planner = Onward(drive, shared)
         here = Branch(

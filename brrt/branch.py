@@ -8,7 +8,7 @@ from brrt.errors import BrrtError, unknown
 from brrt.events import Events, Kind, Phase, Status
 from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
-from brrt.planners.drive import Drive, TreePlanner
+from brrt.planners.drive import Drive, LoopPlanner
 from brrt.planners.stop import Stop
 from brrt.scenario import Scenario
 from brrt.worlds.world import World
@@ -125,19 +125,33 @@ def branching_point(recorded: Recorded, limits: Mapping[str, int]) -> tuple[int,
     return max(iteration, 0), status
 
 
-def check_open(recorded: Recorded, iteration: int, planner: TreePlanner) -> None:
-    """See that a run that ended with a path can go on behind its end.
+def check_open(
+    recorded: Recorded, iteration: int, ended: Status | None, before: LoopPlanner, now: LoopPlanner
+) -> None:
+    """See that a run can go on behind its end.
+
+    Args:
+        recorded: The recording.
+        iteration: Where the branch is to be.
+        ended: How planning ended there; None where it did not.
+        before: The planner up to there.
+        now: The planner from there on.
 
     Raises:
-        BrrtError: The settings say to stop at a path.
+        BrrtError: The run ended with a path and the settings say to stop there, or with the proof
+            that there is no path.
     """
-    if planner.open_ended() != planner:
-        never = planner.open_ended() is None
-        remedy = "" if never else ", or let it improve on its path: --param stop_at_first=false"
-        raise BrrtError(
-            f"{called(recorded)}: the run ended with its path at iteration {iteration:,}; branch "
-            f"before that (--at-iteration){remedy}"
-        )
+    if ended is Status.SOLVED and now.ends_where(before):
+        remedy = f", or {now.onward}" if now.onward else ""
+        outcome = "its path"
+    elif ended is Status.NO_PATH:
+        remedy, outcome = "", "the proof that there is no path"
+    else:
+        return
+    raise BrrtError(
+        f"{called(recorded)}: the run ended with {outcome} at iteration {iteration:,}; branch "
+        f"before that (--at-iteration){remedy}"
+    )
 
 
 def check_budget(recorded: Recorded, drive: Drive, t: int, stop: Stop) -> None:
@@ -184,7 +198,7 @@ def changed(
     return Scenario.parse(values)
 
 
-def tree_planner(scenario: Scenario) -> TreePlanner:
+def loop_planner(scenario: Scenario) -> LoopPlanner:
     """Make a scenario's planner, which must be one that can take other settings on its way.
 
     Raises:
@@ -195,9 +209,30 @@ def tree_planner(scenario: Scenario) -> TreePlanner:
             f"planner {scenario.planner} is not known here, so nobody can go on with it"
         )
     planner = scenario.make_planner()
-    if not isinstance(planner, TreePlanner):
+    if not isinstance(planner, LoopPlanner):
         raise BrrtError(
-            f"planner {scenario.planner} draws nothing and its lattice is laid at the start, so "
-            "there is nothing to branch from: plan again with other settings"
+            f"planner {scenario.planner} cannot be stopped and go on (it is no LoopPlanner): plan "
+            "again with other settings"
         )
     return planner
+
+
+def plans_alike(before: Scenario, now: Scenario) -> bool:
+    """Whether two scenarios differ, but in nothing that planning knows of."""
+    same = before.settings() == now.settings() and before.make_stop() == now.make_stop()
+    return same and before != now
+
+
+def check_settled(before: LoopPlanner, now: LoopPlanner) -> None:
+    """See that nothing is another that was settled when the run began.
+
+    Raises:
+        BrrtError: Something is.
+    """
+    for name in now.settled:
+        then, wanted = getattr(before, name), getattr(now, name)
+        if wanted != then:
+            raise BrrtError(
+                f"{name} cannot be {wanted} from here on: the lattice was laid at the start, with "
+                f"{name} {then}; leave it away, or plan again"
+            )

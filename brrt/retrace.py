@@ -10,31 +10,27 @@ from typing import Any
 
 import numpy as np
 
-from brrt.branch import Shared, called, tree_planner
+from brrt.branch import Shared, called, loop_planner
 from brrt.errors import BrrtError
 from brrt.events import Events
 from brrt.kernels.emit import EventLog
 from brrt.manifest import Manifest
-from brrt.planners.drive import Drive, Loop
+from brrt.planners.drive import UNCOUNTED, Drive, Loop
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.replay.diff import first_difference
 from brrt.scenario import Scenario
-
-_UNCOUNTED = 10**15
 
 
 def _at_start(
     manifest: Manifest, problem: Problem, rng: np.random.Generator, log: EventLog
 ) -> Drive:
     """Begin to plan what a manifest says."""
-    return Drive(_endless(manifest.stretches[0][1], problem), problem, rng, log)
+    return Drive(_retracing(manifest.stretches[0][1], problem), problem, rng, log)
 
 
-def _endless(scenario: Scenario, problem: Problem) -> Loop[Any]:
-    """Make the loop of a stretch, which ends by count alone."""
-    planner = tree_planner(scenario)
-    return (planner.open_ended() or planner).loop(problem, Stop(iterations=_UNCOUNTED))
+def _retracing(scenario: Scenario, problem: Problem) -> Loop[Any]:
+    return loop_planner(scenario).retracing(problem)
 
 
 def _retrace(
@@ -42,9 +38,9 @@ def _retrace(
 ) -> Iterator[Events]:
     """Plan from the start of a run to the end of an iteration; yield what happens on the way."""
     for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
-        yield from drive.go_on(Stop(iterations=_UNCOUNTED, draws=branch.iteration))
-        drive.turn(_endless(after, problem), branch.seed)
-    yield from drive.go_on(Stop(iterations=_UNCOUNTED, draws=iteration))
+        yield from drive.go_on(Stop(iterations=UNCOUNTED, draws=branch.iteration))
+        drive.turn(_retracing(after, problem), branch.seed)
+    yield from drive.go_on(Stop(iterations=UNCOUNTED, draws=iteration))
     yield log.drain()
 
 
@@ -133,5 +129,5 @@ class Anew:
         before = replace(self.manifest, branches=tuple(earlier), scenario=last.scenario)
         drive = _at_start(before, problem, rng, log)
         yield from _retrace(drive, before, problem, log, last.iteration)
-        drive.turn(tree_planner(self.manifest.scenario).loop(problem, stop), last.seed)
+        drive.turn(loop_planner(self.manifest.scenario).loop(problem, stop), last.seed)
         yield from drive.finish(stop)

@@ -85,6 +85,7 @@ class Run:
         self._compile()
         self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
         self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
+        self._gone = False
         self.stop = scenario.make_stop()
         self.manifest = Manifest(
             scenario=scenario,
@@ -115,8 +116,12 @@ class Run:
         """Plan, smooth, drive; yield what happens, in batches.
 
         Raises:
-            BrrtError: A planner of your own emits what no event can say, as a phase of its own.
+            BrrtError: The run has gone already, or a planner of your own emits what no event can
+                say, as a phase of its own.
         """
+        if self._gone:
+            raise BrrtError("a run goes once; make another brrt.Run(scenario) to run it again")
+        self._gone = True
         path, moved, iteration, count = None, False, 0, 0
         for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):
             count += len(batch)

@@ -227,10 +227,14 @@ def choices(case: Case, tally: Tally) -> Windows:
     The estimate of the cell that it leads from is raised to that, and is else what it was.
     """
     lattice = lattice_of(case)
-    walk = _Walk(case, lattice) if lattice is not None and lattice.lookahead == 1 else None
+    grids = [contract.lattice for _, contract in case.stretches]
+    short = any(grid is not None and grid.lookahead == 1 for grid in grids)
+    walk = _Walk(case, lattice) if lattice is not None and short else None
     while (window := (yield)) is not None:
         if lattice is None or walk is None:
             continue
+        ruling = case.ruling(window).lattice
+        judged = ruling is not None and ruling.lookahead == 1
         for kind, event, place in _in_order(case, lattice, window):
             if kind is Kind.REJECT:
                 walk.reject(int(event["node"]), place)
@@ -241,7 +245,8 @@ def choices(case: Case, tally: Tally) -> Windows:
                 walk.look(int(event["cell"]), place)
             elif event["cell"] >= 0:
                 walk.numbers[place] = int(event["cell"])
-                tally.one(event, walk.judge(place))
+                if judged:
+                    tally.one(event, walk.judge(place))
 
 
 def _in_order(case: Case, lattice: Lattice, window: Events) -> Iterator[tuple[Kind, np.void, Cell]]:
