@@ -91,7 +91,7 @@ class BranchedRun(_Again):
         # The clock goes on from the branch, so it is this run's own that is right from there on.
         epoch = self.manifest.epoch_ns - (0 if scenario.clock == "logical" else shared.t)
         branches = (*before.branches, here)
-        self.manifest = replace(self.manifest, branches=branches, epoch_ns=epoch)
+        self.manifest = replace(self.manifest, branches=branches, epoch_ns=max(epoch, 0))
 
 
 class RepeatedRun(_Again):

@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
 from brrt.errors import BrrtError
+from brrt.problem import Problem
 from brrt.robots import Robot, robot_from_json
 from brrt.scenario import Scenario
+from brrt.worlds.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +131,15 @@ class Manifest:
             BrrtError: Its definition is damaged.
         """
         return self.scenario.make_robot() if self.robot is None else robot_from_json(self.robot)
+
+    def make_problem(self, world: World) -> Problem:
+        """Put the recorded query and robot into the recorded world, even where files are gone.
+
+        Raises:
+            BrrtError: The query is of no use in the world, or the robot's definition is damaged.
+        """
+        query = replace(self.scenario, start=self.start, goal=self.goal)
+        return query.make_problem(world, self.make_robot())
 
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""

@@ -147,9 +147,9 @@ def test_contracts_hold(
     log = memory.events()
     found = check(run.manifest, run.problem.world, log)
     assert found == [], scenarios.command(scenario)
-    part = log.until(seq=seed % len(log))
-    for tally in examine(run.manifest, run.problem.world, part, cut=True):
-        assert not tally.broken, (tally.findings, scenarios.command(scenario))
+    for part in (log.until(seq=seed % len(log)), log.until(seq=-1)):
+        for tally in examine(run.manifest, run.problem.world, part, cut=True):
+            assert not tally.broken, (tally.findings, scenarios.command(scenario))
 
 
 def leaf(case: Evidence) -> int:
