@@ -15,6 +15,7 @@ import numpy as np
 from brrt.events import Events
 from brrt.planners.contract import Contract
 from brrt.replay.checks import (
+    acts,
     draws,
     growth,
     lattice,
@@ -34,7 +35,7 @@ from brrt.worlds.world import World
 Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
+    *log.RULES, *acts.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
     *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
 )  # fmt: skip
 

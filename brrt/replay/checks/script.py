@@ -1,6 +1,8 @@
 """A log as a planner acts it out: iteration after iteration, in one table."""
 
+from collections.abc import Iterable
 from collections.abc import Set as AbstractSet
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,7 @@ from numpy.typing import NDArray
 from brrt.events import Events, Kind, Source, Table
 
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 
 def script_dtype(dof: int) -> np.dtype[np.void]:
@@ -24,6 +27,7 @@ _FIELDS = {
     Kind.SAMPLE: {"tree": "tree", "why": "source", "q": "q"},
     Kind.REJECT: {"tree": "tree", "why": "reason", "node": "node", "q": "q"},
     Kind.EDGE: {"tree": "tree", "node": "node", "parent": "parent", "q": "q"},
+    Kind.REWIRE: {"tree": "tree", "node": "node", "parent": "parent"},
     Kind.CONNECT: {"node": "node", "parent": "other"},
 }
 """For each kind, what the script's columns are filled from; the others stay -1."""
@@ -91,6 +95,23 @@ def followed(lines: Table) -> Table:
 def last_where(chosen: NDArray[np.bool_]) -> Ints:
     """For each line the last one up to it that is chosen, or -1, shape (n,)."""
     return np.maximum.accumulate(np.where(chosen, np.arange(len(chosen)), -1))
+
+
+def numbered(parts: Iterable[NDArray[Any]], q: Floats | None = None) -> NDArray[np.uint64]:
+    """One number for each row of what is in columns; rows that are equal have equal numbers.
+
+    Args:
+        parts: Columns of whole numbers, shape (n,) each.
+        q: Configurations besides, shape (n, dof).
+    """
+    columns = [np.asarray(part).astype(np.uint64) for part in parts]
+    if q is not None:
+        columns += list(np.ascontiguousarray(q + 0.0).view(np.uint64).reshape(q.shape).T)
+    keys = np.zeros(len(columns[0]), np.uint64)
+    for column in columns:
+        keys = (keys ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        keys ^= keys >> np.uint64(29)
+    return keys
 
 
 def heads_for_other(lines: Table) -> NDArray[np.bool_]:
