@@ -215,9 +215,7 @@ class Walk:
                 if log.room < 20:
                     yield log.drain()
             if (path[-1] == goal).all():
-                stage = Stage.IMPROVED if trial else Stage.RAW
-                if stage is Stage.RAW:
-                    log.emit(Kind.PATH, moves, stage=stage, cost=cost, waypoints=np.array(path))
+                log.emit(Kind.PATH, moves, stage=Stage.RAW, cost=cost, waypoints=np.array(path))
             else:
                 status = Status.ITERATION_LIMIT
         log.emit(Kind.PHASE, moves, name=Phase.PLAN, status=status)

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Cell = tuple[int, ...]
 
+_BLIND = "a move without a look around"
+
 _KINDS = (Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE)
 
 
@@ -85,7 +87,7 @@ def _first_with(keys: Ints, values: Ints) -> Ints:
     return np.asarray(values[first][inverse.reshape(-1)])
 
 
-def _adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
+def adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
     """Whether cells are neighbours, integer coordinates of shape (n, d)."""
     apart = np.abs(b - a)
     if lattice.diagonals:
@@ -94,10 +96,14 @@ def _adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
 
 
 def expansions(case: Case, tally: Tally) -> None:
-    """A cell is reached from a neighbour that its search expanded, freely; its cost is right."""
+    """A cell is reached from a neighbour that its search expanded, freely; its cost is right.
+
+    A search begins where the robot is, and expands no cell twice.
+    """
     lattice, table = lattice_of(case), case.events[Kind.EXPAND]
     if lattice is None or not len(table):
         return
+    _look_begun(case, tally, lattice, table)
     parent = _parents(table)
     root = table["parent"] < 0
     tally.look(
@@ -109,7 +115,7 @@ def expansions(case: Case, tally: Tally) -> None:
     )  # fmt: skip
     some, above = table[parent >= 0], table[parent[parent >= 0]]
     a, b = np.asarray(above["q"]), np.asarray(some["q"])
-    apart = ~_adjacent(lattice, indices(case, lattice, a), indices(case, lattice, b))
+    apart = ~adjacent(lattice, indices(case, lattice, a), indices(case, lattice, b))
     tally.look(
         some, apart,
         lambda i: f"cells {above['cell'][i]} and {some['cell'][i]} are no neighbours",
@@ -120,6 +126,34 @@ def expansions(case: Case, tally: Tally) -> None:
         lambda i: f"cell {some['cell'][i]} costs {cost[i]:.12g}, not {some['cost'][i]:.12g}",
     )  # fmt: skip
     case.look_free(tally, some, a, b, "motion between cells")
+
+
+def _look_begun(case: Case, tally: Tally, lattice: Lattice, table: Table) -> None:
+    """See that searches begin where the robot is then, once at each place, and repeat no cell."""
+    root = table["parent"] < 0
+    search = np.cumsum(root)
+    again = np.ones(len(table), bool)
+    again[np.unique(np.stack([search, table["cell"]]), axis=1, return_index=True)[1]] = False
+    tally.look(table, again, lambda i: f"cell {table['cell'][i]} is expanded again in one search")
+    moves, paths = case.events[Kind.MOVE], case.events[Kind.PATH]
+    begins = table[root]
+    moved = np.searchsorted(moves["seq"], begins["seq"])
+    told = np.searchsorted(paths["seq"], begins["seq"])
+    q, back = case.start + np.zeros((len(begins), case.dof)), moved == 0
+    last = moves[np.maximum(moved, 1) - 1] if len(moves) else moves
+    if len(moves):
+        # A path is told on arrival, and the next trial begins at the start.
+        back |= (last["cell"] < 0) | (np.append(-1, paths["seq"])[told] > last["seq"])
+        q[~back] = last["q"][~back]
+    off = np.abs(np.asarray(begins["q"]) - q).max(axis=1, initial=0)
+    idle = np.diff(moved + told, prepend=-1) == 0
+    tally.look(
+        begins, ~(off <= CLOSE * lattice.epsilon + case.blur) | idle,
+        lambda i: (
+            f"another search from cell {begins['cell'][i]} without a move" if idle[i]
+            else f"a search from {text(begins['q'][i])}; the robot is at {text(q[i])}"
+        ),
+    )  # fmt: skip
 
 
 def _parents(table: Table) -> Ints:
@@ -145,7 +179,10 @@ def estimates(case: Case, tally: Tally) -> None:
     same = np.diff(table["cell"][order], prepend=-(1 << 31)) == 0
     before = case.distance(np.asarray(table["q"]), case.goal[None])
     before[order[same]] = h[order[np.flatnonzero(same) - 1]]
-    wrong = ~(h > before - case.blur)
+    # The first is compared with a distance, which is rounded.
+    slack = np.full(len(table), case.blur)
+    slack[order[same]] = 0.0
+    wrong = ~(h > before - slack)
     tally.look(
         table, wrong,
         lambda i: f"cell {table['cell'][i]}: an estimate of {h[i]:.12g} after {before[i]:.12g}",
@@ -198,7 +235,7 @@ def lattice_moves(case: Case, tally: Tally) -> None:
         return
     before = _origins(case, table)
     goal = table["cell"] < 0
-    near = _adjacent(lattice, *(indices(case, lattice, q) for q in (before, table["q"])))
+    near = adjacent(lattice, *(indices(case, lattice, q) for q in (before, table["q"])))
     wrong = np.where(goal, (np.asarray(table["q"]) != case.goal).any(axis=1), ~near)
     tally.look(
         table, wrong,
@@ -224,7 +261,8 @@ def _origins(case: Case, table: Table) -> Floats:
 def choices(case: Case, tally: Tally) -> Windows:
     """With a lookahead of 1 each move is to a free neighbour of least cost and estimate.
 
-    The estimate of the cell that it leads from is raised to that, and is else what it was.
+    The estimate of the cell that it leads from is raised to that, and is else what it was; no
+    move, that to the goal included, is made without a look around.
     """
     lattice = lattice_of(case)
     walk = _Walk(case, lattice) if lattice is not None and lattice.lookahead == 1 else None
@@ -235,13 +273,14 @@ def choices(case: Case, tally: Tally) -> Windows:
             if kind is Kind.REJECT:
                 walk.reject(int(event["node"]), place)
             elif kind is Kind.HEURISTIC:
-                walk.h[place] = float(event["h"])
-                walk.raised = place
+                tally.one(event, walk.learn(place, float(event["h"])))
             elif kind is Kind.EXPAND:
                 walk.look(int(event["cell"]), place)
             elif event["cell"] >= 0:
                 walk.numbers[place] = int(event["cell"])
                 tally.one(event, walk.judge(place))
+            else:
+                tally.one(event, walk.arrive())
 
 
 def _in_order(case: Case, lattice: Lattice, window: Events) -> Iterator[tuple[Kind, np.void, Cell]]:
@@ -288,10 +327,21 @@ class _Walk:
             self.h[place] = float(self.case.distance(q[None], self.case.goal[None])[0])
         return self.h[place]
 
+    def learn(self, place: Cell, h: float) -> str | None:
+        """Take in a new estimate; say what is wrong with where it is learnt."""
+        self.h[place], self.raised = h, place
+        here = self.at is not None and self.at[1] == place
+        return None if here else f"an estimate of {list(place)}, where the robot does not look"
+
+    def arrive(self) -> str | None:
+        """Go to the goal; say what is wrong with that."""
+        looked, self.at = self.at is not None, None
+        return None if looked else _BLIND
+
     def judge(self, target: Cell) -> str | None:
         """Say what is wrong with a move to a cell."""
         if self.at is None:
-            return "a move without a look around"
+            return _BLIND
         cell, place = self.at
         self.at = None
         blocked = self.blocked.get(cell, set())
