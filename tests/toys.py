@@ -193,10 +193,10 @@ class Walk:
                     if free(problem, here, place(other)):
                         choices.append((self.epsilon + estimate(other), other))
                     elif cell not in looked:
-                        log.emit(
-                            Kind.REJECT, moves, tree=0, node=number, reason=Reason.COLLISION,
-                            q=place(other),
-                        )  # fmt: skip
+                        q, world = place(other), problem.world
+                        beyond = ((q < world.lower) | (world.upper < q)).any()
+                        reason = Reason.LIMITS if beyond else Reason.COLLISION
+                        log.emit(Kind.REJECT, moves, tree=0, node=number, reason=reason, q=q)
                 looked.add(cell)
                 if not arrives:
                     best, cell_next = min(choices)

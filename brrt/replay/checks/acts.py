@@ -26,7 +26,7 @@ def phase_contents(case: Case, tally: Tally) -> Windows:
     while (window := (yield)) is not None:
         phases = window[Kind.PHASE]
         begins = phases["status"] == Status.BEGIN
-        states = np.append(running, np.where(begins, phases["name"], _NOWHERE)).astype(np.int64)
+        states = np.append(running, np.where(begins, phases["name"].astype(np.int64), _NOWHERE))
         for kind, table in window.tables.items():
             if kind is Kind.PHASE or not len(table):
                 continue
@@ -108,12 +108,11 @@ def extensions(case: Case, tally: Tally) -> Windows:
         if growth is not None and len(lines) > 1 and not _links_only(contract):
             lines = lines if window is None else followed(lines)
             right = _star_follows(lines) if contract.near is not None else _rrt_follows(lines)
-            begun = last_where(lines["kind"] == Kind.SAMPLE)[:-1] >= 0
-            now, after = lines[:-1][begun], lines[1:][begun]
+            begun = np.maximum.accumulate(lines["kind"][:-1] == Kind.SAMPLE)
             tally.look(
-                now, ~right[begun],
-                lambda i, n=now, a=after: (  # type: ignore[misc]
-                    f"{_act(n[i])} is followed by {_act(a[i])}, which does not come of it"
+                lines[:-1], begun & ~right,
+                lambda i, n=lines: (  # type: ignore[misc]
+                    f"{_act(n[i])} is followed by {_act(n[i + 1])}, which does not come of it"
                 ),
             )  # fmt: skip
             if contract.near is None:
@@ -164,6 +163,9 @@ def _look_slices(case: Case, tally: Tally, slices: int, lines: Table, *, ended: 
     if not len(first) or not last:
         return
     made = np.add.reduceat(edge.astype(np.int64), first)[:last]
+    if ((made == 0) | (made == slices)).all():
+        tally.examined += last
+        return
     newest = np.append(first[1:], len(lines))[:last] - 1
     # The last edge of a run may be the one to the goal, with a path and the end after it.
     at = last_where(edge)[newest]
