@@ -1,6 +1,6 @@
 """Doctor sound recordings, one event at a time, and see which share of the lies is found.
 
-    python benchmarks/doctor.py [--runs 70] [--each 3] [--seed 0] [--planner NAME] [--show EVENT.WAY]
+    python benchmarks/doctor.py [--runs 70] [--each 3] [--seed 0] [--planner NAME] [--show X.WAY]
 
 Runs are drawn as benchmarks/soak.py draws them, those that say between 60 and 2,500 events. In each
 a random event of each kind is doctored in each way: a number off by a thousandth, another node,
@@ -30,6 +30,7 @@ from tests.scenarios import PLANNERS, command, draw
 
 LEAST, MOST = 60, 2500
 """Events of runs that are doctored."""
+
 
 def found(run: Run, log: Events) -> bool:
     """Whether any rule finds fault with a log."""

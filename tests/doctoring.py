@@ -51,9 +51,7 @@ def other_value(log: Events, field: Field, kind: Kind, old: Any, rng: np.random.
     return rng.choice(known) if len(known) else None
 
 
-def other_iteration(
-    log: Events, kind: Kind, row: int, rng: np.random.Generator
-) -> Events | None:
+def other_iteration(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Events | None:
     """Say that an event belongs to the iteration before or after."""
     table = log[kind].copy()
     table["iteration"][row] = max(0, table["iteration"][row] + rng.choice([-1, 1]))
@@ -62,7 +60,7 @@ def other_iteration(
     return Events(log.dof, {**log.tables, kind: table})
 
 
-def dropped(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Events:  # noqa: ARG001
+def dropped(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Events:
     """Leave an event out; the others close up."""
     gone = log[kind]["seq"][row]
     tables = {k: t[t["seq"] != gone].copy() for k, t in log.tables.items()}
@@ -71,7 +69,7 @@ def dropped(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Even
     return Events(log.dof, {k: t for k, t in tables.items() if len(t)})
 
 
-def doubled(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Events:  # noqa: ARG001
+def doubled(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Events:
     """Tell of an event twice, one right after the other; what follows is a nanosecond later."""
     seq = log[kind]["seq"][row]
     tables = {k: t.copy() for k, t in log.tables.items()}
@@ -87,7 +85,10 @@ def doubled(log: Events, kind: Kind, row: int, rng: np.random.Generator) -> Even
 
 
 def swapped(
-    log: Events, kind: Kind, row: int, rng: np.random.Generator  # noqa: ARG001
+    log: Events,
+    kind: Kind,
+    row: int,
+    rng: np.random.Generator,
 ) -> Events | None:
     """Tell of an event after the next one; each keeps its iteration, times and numbers rise."""
     first = log[kind]["seq"][row]

@@ -124,7 +124,9 @@ LIES: list[tuple[str, int, Doctor]] = [
 def test_lies_about_draws_are_found(rule: str, n: int, doctor: Doctor, seed: int) -> None:
     """By the rule that they break alone, at a draw and not only at the end of the log."""
     case = log_of(n, doctor, seed)
-    tallies = {t.rule: t for t in examine(case.manifest, case.world, case.log, case.contract) if t.broken}
+    tallies = {
+        t.rule: t for t in examine(case.manifest, case.world, case.log, case.contract) if t.broken
+    }
     assert tallies.keys() == {rule}
     for found in tallies[rule].findings:
         assert found.seq == -1 or 2 <= found.seq < n + 2

@@ -35,8 +35,8 @@ from brrt.worlds.world import World
 Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *acts.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
-    *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
+    *log.RULES, *acts.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES,
+    *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
 )  # fmt: skip
 
 

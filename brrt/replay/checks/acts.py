@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status, Table
+from brrt.events import Kind, Phase, Reason, Source, Stage, Status, Table
 from brrt.planners.contract import Contract
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.script import followed, last_where, numbered
@@ -81,7 +81,7 @@ def told_once(case: Case, tally: Tally) -> Windows:
             keys = _contents(kind, table)
             again = np.ones(len(table), bool)
             again[np.unique(keys, return_index=True)[1]] = False
-            tally.look(table, again, lambda i, k=kind: f"the same {k.label} as before")  # type: ignore[misc]
+            tally.look(table, again, lambda _, k=kind: f"the same {k.label} as before")  # type: ignore[misc]
 
 
 def _contents(kind: Kind, table: Table) -> NDArray[np.uint64]:
@@ -122,7 +122,9 @@ def extensions(case: Case, tally: Tally) -> Windows:
 
 
 def _links_only(contract: Contract) -> bool:
-    return contract.near is None and contract.growth is not None and contract.growth.links is not None
+    return (
+        contract.near is None and contract.growth is not None and contract.growth.links is not None
+    )
 
 
 def _act(line: np.void) -> str:
@@ -130,7 +132,11 @@ def _act(line: np.void) -> str:
     kind, why = Kind(line["kind"]), int(line["why"])
     names = {Kind.REJECT: Reason, Kind.SAMPLE: Source}.get(kind)
     known = names is not None and why in set(names)
-    return f"{kind.label} ({names(why).name.lower().replace('_', ' ')})" if known and names else kind.label
+    return (
+        f"{kind.label} ({names(why).name.lower().replace('_', ' ')})"
+        if known and names
+        else kind.label
+    )
 
 
 def _rrt_follows(lines: Table) -> Flags:
@@ -156,10 +162,8 @@ def _look_slices(case: Case, tally: Tally, slices: int, lines: Table, *, ended: 
     """See that each extension that was made is as many nodes as a step is cut into."""
     sample, edge = lines["kind"] == Kind.SAMPLE, lines["kind"] == Kind.EDGE
     first = np.flatnonzero(sample)
-    if ended or case.cut:
-        last = len(first) - 1
-    else:
-        last = len(first)
+    # The last line of a script that is followed is a sample; a log that is cut may end anywhere.
+    last = len(first) - int(ended or case.cut)
     if not len(first) or not last:
         return
     made = np.add.reduceat(edge.astype(np.int64), first)[:last]
@@ -194,7 +198,9 @@ def _star_follows(lines: Table) -> Flags:
     begins = edge | near | (reject & np.isin(why, _NEW_NODE))
     same, other = after["tree"] == now["tree"], after["tree"] == 1 - now["tree"]
     here = (after["q"] == now["q"]).all(axis=1)
-    rewires = same & ((near & (after["node"] == node)) | ((kind == Kind.REWIRE) & (after["parent"] == node)))
+    rewires = same & (
+        (near & (after["node"] == node)) | ((kind == Kind.REWIRE) & (after["parent"] == node))
+    )
     rests = np.isin(kind, [Kind.SAMPLE, Kind.PHASE, Kind.PATH])
     links = (kind == Kind.CONNECT) | (reject & (why == Reason.LINK_BLOCKED))
     ours = now["tree"] == turn

@@ -176,11 +176,16 @@ def endings(case: Case, tally: Tally) -> None:
             wrong = f"planning ended after {took:.6f} s; it had {scenario.time:g} s"
     elif case.outcome is Status.SOLVED and case.contract.stops is False:
         wrong = "planning ended as solved; it was to go on for a better path"
-    elif case.outcome is Status.NO_PATH and case.contract.lattice is None:
-        wrong = "planning ended as if there were no path, which only a search can prove"
-    elif case.outcome is Status.DONE:
-        wrong = "planning is said to be done, which is no way for it to end"
-    tally.one(ends[0], wrong)
+    tally.one(ends[0], wrong or _impossible(case))
+
+
+def _impossible(case: Case) -> str | None:
+    """Say why planning cannot have ended as it is said to have."""
+    if case.outcome is Status.NO_PATH and case.contract.lattice is None:
+        return "planning ended as if there were no path, which only a search can prove"
+    if case.outcome is Status.DONE:
+        return "planning is said to be done, which is no way for it to end"
+    return None
 
 
 def _not_done(case: Case, event: np.void) -> str | None:

@@ -62,16 +62,19 @@ class Scripts:
     Args:
         dof: Numbers in a configuration.
         firsts: Events that an iteration begins with in any case, since other settings rule it.
+        growing: Whether trees grow; else there are no samples, and nothing is acted out.
     """
 
-    def __init__(self, dof: int, firsts: AbstractSet[int]) -> None:
-        self._firsts = firsts
+    def __init__(self, dof: int, firsts: AbstractSet[int], *, growing: bool = True) -> None:
+        self._firsts, self._growing = firsts, growing
         self._window: Events | None = None
         self._held = self._made = np.empty(0, script_dtype(dof))
         self._ended = False
 
     def of(self, window: Events | None) -> Table:
         """Return the iterations that end in a window; at the end of the log, the last one."""
+        if not self._growing:
+            return self._made
         if window is None:
             if not self._ended:
                 self._made, self._ended = self._held, True

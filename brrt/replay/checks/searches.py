@@ -179,9 +179,7 @@ def neighbours(case: Case, tally: Tally) -> None:
     _look_open(case, tally, lattice, np.unique(motions))
 
 
-def _look_open(
-    case: Case, tally: Tally, lattice: Lattice, blocked: NDArray[np.uint64]
-) -> None:
+def _look_open(case: Case, tally: Tally, lattice: Lattice, blocked: NDArray[np.uint64]) -> None:
     """See that what was not turned down can be reached."""
     table = case.events[Kind.EXPAND]
     table = table[: len(table) - case.cut]
