@@ -14,6 +14,7 @@ packages that bring a plugin.
 from brrt.again import BranchedRun, RepeatedRun
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
+from brrt.manifest import Manifest
 from brrt.planners import PLANNERS, RRT, Planner
 from brrt.problem import Problem
 from brrt.recording import McapSink, Memory, Recording, read
@@ -28,7 +29,7 @@ from brrt.replay.metrics import Metrics
 from brrt.replay.moment import Moment
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
 from brrt.run import Run, Sink
-from brrt.scenario import Manifest, Scenario
+from brrt.scenario import Scenario
 from brrt.testing.gate import Verdict, gate
 from brrt.worlds import GENERATORS, Grid, World, make_world
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from brrt import branch
 from brrt.branch import Recorded
-from brrt.events import Status
+from brrt.manifest import Branch, Manifest
+from brrt.retrace import Anew, Onward, proved
 from brrt.run import Run, Solver, made_by
-from brrt.scenario import Branch, Manifest, Scenario
+from brrt.scenario import Scenario
 from brrt.worlds.world import World
 
 
@@ -60,17 +61,18 @@ class BranchedRun(_Again):
         **until: int,
     ) -> None:
         iteration, ended = branch.branching_point(recording, until)
-        before = branch.ruling(recording.manifest, iteration)
+        before = recording.manifest.ruling(iteration)
         scenario = branch.changed(before, params or {}, seed, settings or {})
-        planner = branch.tree_planner(scenario)
-        if ended is Status.SOLVED:
-            branch.check_open(recording, iteration, planner)
+        planner = branch.loop_planner(scenario)
+        parent = branch.loop_planner(before.scenario)
+        branch.check_settled(parent, planner)
+        branch.check_open(recording, iteration, ended, parent, planner)
         self._set_up_again(before, scenario, recording.world, planner, batch)
         shared = branch.Shared(recording, iteration)
-        drive = branch.proved(shared, before, self.problem, self._rng, self._log, made_by())
+        drive = proved(shared, before, self.problem, self._rng, self._log, made_by())
         branch.check_budget(recording, drive, shared.t, self.stop)
         drive.turn(planner.loop(self.problem, self.stop), seed)
-        self._planner = branch.Onward(drive, shared)
+        self._planner = Onward(drive, shared)
         here = Branch(
             parent=recording.manifest.digest(),
             file=recording.name,
@@ -105,5 +107,5 @@ class RepeatedRun(_Again):
         scenario = own if draws is None else own.with_stop_at(draws)
         self._set_up_again(manifest, scenario, world, scenario.make_planner(), batch)
         if manifest.branches:
-            self._planner = branch.Anew(replace(manifest, scenario=scenario))
+            self._planner = Anew(replace(manifest, scenario=scenario))
             self.manifest = replace(self.manifest, branches=manifest.branches)

@@ -1,30 +1,20 @@
-"""Go on from a recorded state with other settings.
-
-Planning is deterministic, so the state after an iteration is made by planning again up to there,
-and it is proved to be the recorded one by holding every event on the way against the recording.
-"""
+"""Where and whether a recorded run can go on with other settings."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
-
-import numpy as np
 
 from brrt.errors import BrrtError, unknown
 from brrt.events import Events, Kind, Phase, Status
-from brrt.kernels.emit import EventLog
+from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
-from brrt.planners.drive import Drive, Loop, TreePlanner
+from brrt.planners.drive import Drive, LoopPlanner
 from brrt.planners.stop import Stop
-from brrt.problem import Problem
-from brrt.replay.diff import first_difference
-from brrt.scenario import Branch, Manifest, Scenario
+from brrt.scenario import Scenario
 from brrt.worlds.world import World
 
 _CHANGEABLE = ("iterations", "time", "smooth", "shortcuts", "execute", "max_move", "deadline")
 """What of a scenario may be another from a branch on, beside the planner's parameters."""
-
-_UNCOUNTED = 10**15
 
 
 class Recorded(Protocol):
@@ -135,19 +125,33 @@ def branching_point(recorded: Recorded, limits: Mapping[str, int]) -> tuple[int,
     return max(iteration, 0), status
 
 
-def check_open(recorded: Recorded, iteration: int, planner: TreePlanner) -> None:
-    """See that a run that ended with a path can go on behind its end.
+def check_open(
+    recorded: Recorded, iteration: int, ended: Status | None, before: LoopPlanner, now: LoopPlanner
+) -> None:
+    """See that a run can go on behind its end.
+
+    Args:
+        recorded: The recording.
+        iteration: Where the branch is to be.
+        ended: How planning ended there; None where it did not.
+        before: The planner up to there.
+        now: The planner from there on.
 
     Raises:
-        BrrtError: The settings say to stop at a path.
+        BrrtError: The run ended with a path and the settings say to stop there, or with the proof
+            that there is no path.
     """
-    if planner.open_ended() != planner:
-        never = planner.open_ended() is None
-        remedy = "" if never else ", or let it improve on its path: --param stop_at_first=false"
-        raise BrrtError(
-            f"{called(recorded)}: the run ended with its path at iteration {iteration:,}; branch "
-            f"before that (--at-iteration){remedy}"
-        )
+    if ended is Status.SOLVED and now.ends_where(before):
+        remedy = f", or {now.onward}" if now.onward else ""
+        outcome = "its path"
+    elif ended is Status.NO_PATH:
+        remedy, outcome = "", "the proof that there is no path"
+    else:
+        return
+    raise BrrtError(
+        f"{called(recorded)}: the run ended with {outcome} at iteration {iteration:,}; branch "
+        f"before that (--at-iteration){remedy}"
+    )
 
 
 def check_budget(recorded: Recorded, drive: Drive, t: int, stop: Stop) -> None:
@@ -165,15 +169,6 @@ def check_budget(recorded: Recorded, drive: Drive, t: int, stop: Stop) -> None:
     else:
         return
     raise BrrtError(f"{called(recorded)}: at the branch {spent}, counted from the run's start")
-
-
-def ruling(manifest: Manifest, iteration: int) -> Manifest:
-    """Return what a manifest would be without the branches that came after an iteration."""
-    kept = tuple(b for b in manifest.branches if b.iteration <= iteration)
-    later = manifest.branches[len(kept) :]
-    return replace(
-        manifest, branches=kept, scenario=later[0].scenario if later else manifest.scenario
-    )
 
 
 def changed(
@@ -203,7 +198,7 @@ def changed(
     return Scenario.parse(values)
 
 
-def tree_planner(scenario: Scenario) -> TreePlanner:
+def loop_planner(scenario: Scenario) -> LoopPlanner:
     """Make a scenario's planner, which must be one that can take other settings on its way.
 
     Raises:
@@ -214,131 +209,24 @@ def tree_planner(scenario: Scenario) -> TreePlanner:
             f"planner {scenario.planner} is not known here, so nobody can go on with it"
         )
     planner = scenario.make_planner()
-    if not isinstance(planner, TreePlanner):
+    if not isinstance(planner, LoopPlanner):
         raise BrrtError(
-            f"planner {scenario.planner} draws nothing and its lattice is laid at the start, so "
-            "there is nothing to branch from: plan again with other settings"
+            f"planner {scenario.planner} cannot be stopped and go on (it is no LoopPlanner): plan "
+            "again with other settings"
         )
     return planner
 
 
-def at_start(
-    manifest: Manifest, problem: Problem, rng: np.random.Generator, log: EventLog
-) -> Drive:
-    """Begin to plan what a manifest says."""
-    return Drive(_endless(manifest.stretches[0][1], problem), problem, rng, log)
-
-
-def _endless(scenario: Scenario, problem: Problem) -> Loop[Any]:
-    """Make the loop of a stretch, which ends by count alone."""
-    planner = tree_planner(scenario)
-    return (planner.open_ended() or planner).loop(problem, Stop(iterations=_UNCOUNTED))
-
-
-def retrace(
-    drive: Drive, manifest: Manifest, problem: Problem, log: EventLog, iteration: int
-) -> Iterator[Events]:
-    """Plan from the start of a run to the end of an iteration; yield what happens on the way."""
-    turns = [(b.iteration, b.seed, after) for b, after in _turns(manifest)]
-    for end, seed, scenario in turns:
-        yield from drive.go_on(Stop(iterations=_UNCOUNTED, draws=end))
-        drive.turn(_endless(scenario, problem), seed)
-    yield from drive.go_on(Stop(iterations=_UNCOUNTED, draws=iteration))
-    yield log.drain()
-
-
-def _turns(manifest: Manifest) -> list[tuple[Branch, Scenario]]:
-    """Return each branch with the scenario that rules behind it."""
-    return [
-        (branch, scenario)
-        for branch, (_, scenario) in zip(manifest.branches, manifest.stretches[1:], strict=True)
-    ]
-
-
-def proved(
-    shared: Shared,
-    before: Manifest,
-    problem: Problem,
-    rng: np.random.Generator,
-    log: EventLog,
-    made_by: Mapping[str, str],
-) -> Drive:
-    """Plan again up to the branch; return what plans, in the state that was recorded.
-
-    Args:
-        shared: The recorded events up to there.
-        before: What ruled up to there.
-        problem: Robot, world, start and goal.
-        rng: Every random draw comes from here.
-        log: Numbers and times the events.
-        made_by: The versions here, to be named beside the recorded ones.
+def check_settled(before: LoopPlanner, now: LoopPlanner) -> None:
+    """See that nothing is another that was settled when the run began.
 
     Raises:
-        BrrtError: An event is not the recorded one.
+        BrrtError: Something is.
     """
-    drive = at_start(before, problem, rng, log)
-    again = retrace(drive, before, problem, log, shared.iteration)
-    found = first_difference(shared, again)
-    if found is not None:
-        raise BrrtError(
-            f"{called(shared.recorded)}: planned again, the run parts from its recording at "
-            f"{found} (recorded against planned); {_versions(before.made_by, made_by)}"
-        )
-    return drive
-
-
-def _versions(then: Mapping[str, str], now: Mapping[str, str]) -> str:
-    unlike = [
-        f"{name} {then.get(name)} then, {here} now"
-        for name, here in now.items()
-        if then.get(name) != here
-    ]
-    same = ", ".join(f"{name} {here}" for name, here in now.items())
-    return "; ".join(unlike) or f"both by {same}"
-
-
-@dataclass(frozen=True, slots=True)
-class Onward:
-    """Plans on from a state that was proved to be the recorded one; a solver, see `Planner.solve`.
-
-    Attributes:
-        drive: What plans, at the branch.
-        shared: The recorded events up to there.
-    """
-
-    drive: Drive
-    shared: Shared
-
-    def solve(
-        self,
-        problem: Problem,  # noqa: ARG002
-        rng: np.random.Generator,  # noqa: ARG002
-        log: EventLog,
-        stop: Stop,
-    ) -> Iterator[Events]:
-        """Yield what was recorded, then what happens from there on."""
-        yield from self.shared
-        log.resume(self.shared.t)
-        yield from self.drive.finish(stop)
-
-
-@dataclass(frozen=True, slots=True)
-class Anew:
-    """Plans what a manifest with branches says, from the start; a solver, see `Planner.solve`.
-
-    Attributes:
-        manifest: The manifest.
-    """
-
-    manifest: Manifest
-
-    def solve(
-        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
-    ) -> Iterator[Events]:
-        """Yield everything that happens."""
-        *earlier, last = self.manifest.branches
-        before = replace(self.manifest, branches=tuple(earlier), scenario=last.scenario)
-        drive = at_start(before, problem, rng, log)
-        yield from retrace(drive, before, problem, log, last.iteration)
-        drive.turn(tree_planner(self.manifest.scenario).loop(problem, stop), last.seed)
-        yield from drive.finish(stop)
+    for name in now.settled:
+        then, wanted = getattr(before, name), getattr(now, name)
+        if wanted != then:
+            raise BrrtError(
+                f"{name} cannot be {wanted} from here on: the lattice was laid at the start, with "
+                f"{name} {then}; leave it away, or plan again"
+            )

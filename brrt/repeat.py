@@ -7,12 +7,12 @@ from typing import Any, Self, TypeGuard
 from brrt.again import RepeatedRun
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
+from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
 from brrt.replay.diff import Deviation, Difference, first_difference
 from brrt.replay.side_by_side import parting, parting_as_dict
 from brrt.replay.told import Row, rows_of
 from brrt.run import Run, made_by
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 TOLERANCE = 1e-9

@@ -13,11 +13,12 @@ import numpy as np
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind
 from brrt.kernels.emit import EventLog
+from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.replay.metrics import Metrics
-from brrt.scenario import Manifest, Scenario
+from brrt.scenario import Scenario
 from brrt.settings import Settings
 from brrt.worlds.world import World
 

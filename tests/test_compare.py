@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrt import Comparison, Events, Kind, Manifest, McapSink, Scenario, World, compare, read
-from brrt.scenario import Branch
+from brrt.manifest import Branch
 
 from .conftest import Result, recorded
 

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
-from brrt.events import FIELDS, Events, Instant, Kind, LazyTables, Table, table_dtype
+from brrt.events import FIELDS, Events, Instant, Kind, LazyTables, Phase, Table, table_dtype
 from brrt.kernels.clock import COMPILED_CLOCK, now_ns
 from brrt.kernels.jit import inlined
 
 INTS = 3
 """Integer fields that a kind may have; `emit` takes this many."""
+
+_PHASE, _PLAN = int(Kind.PHASE), int(Phase.PLAN)
 
 _COUNT, _FIRST_SEQ, _LAST_T, _ORIGIN, _TICK, _POINTS = range(6)
 
@@ -109,6 +111,12 @@ def take_points(buffer: Buffer, n: int) -> int:
     first = int(buffer.state[_POINTS])
     buffer.state[_POINTS] += n
     return first
+
+
+@inlined
+def emit_end(buffer: Buffer, iteration: int, status: int) -> None:
+    """Say how planning has ended, a `Status`; the caller saw to it that there is room."""
+    emit(buffer, _PHASE, iteration, _PLAN, status, 0, 0.0, buffer.q, 0)
 
 
 def _slots(kind: Kind) -> list[tuple[str, str, int]]:

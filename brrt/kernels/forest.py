@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Phase, Status
+from brrt.events import Kind
 from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
 from brrt.kernels.jit import inlined
 from brrt.kernels.kdtree import KdTree, grown_kdtree, has_room, insert, rooted_kdtree
@@ -13,8 +13,7 @@ from brrt.kernels.space import distance
 
 Floats = NDArray[np.float64]
 
-_EDGE, _PATH, _PHASE = int(Kind.EDGE), int(Kind.PATH), int(Kind.PHASE)
-_PLAN, _SOLVED = int(Phase.PLAN), int(Status.SOLVED)
+_EDGE, _PATH = int(Kind.EDGE), int(Kind.PATH)
 
 RESERVED_NODES = 1 << 22
 """Room that is asked for at once. Memory is taken only as it fills, so asking costs nothing, and a
@@ -161,9 +160,3 @@ def emit_path(
         goal = forest.parent[goal]
     emit(log, _PATH, iteration, stage, first, n, cost, forest.q, 0)
     return 0
-
-
-@inlined
-def emit_solved(log: Buffer, iteration: int) -> None:
-    """Say that planning has ended with a path; there is room where a path has just been said."""
-    emit(log, _PHASE, iteration, _PLAN, _SOLVED, 0, 0.0, log.q, 0)

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason
-from brrt.kernels.emit import Buffer, emit
+from brrt.events import Kind, Reason, Stage
+from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
 from brrt.kernels.jit import borrowing, inlined
 from brrt.kernels.space import distance, segment_free
 
@@ -21,6 +21,7 @@ Longs = NDArray[np.int64]
 Columns = TypeVar("Columns", "Lattice", "Search")
 
 EXPAND, REJECT = int(Kind.EXPAND), int(Kind.REJECT)
+_PATH, _RAW = int(Kind.PATH), int(Stage.RAW)
 COLLISION, LIMITS = int(Reason.COLLISION), int(Reason.LIMITS)
 
 MOST_CELLS = 1 << 19
@@ -386,3 +387,23 @@ def expand(
             search.g[other], search.parent[other], search.mark[other] = g, cell, now
             push(search, g + lattice.h[other], lattice.h[other], other)
     return False
+
+
+@inlined
+def emit_way(
+    lattice: Lattice, log: Buffer, iteration: int, cells: Ints, n: int, cost: float
+) -> int:
+    """Say that there is a path along the first n cells, where `BLOCKED` stands for the goal.
+
+    Returns:
+        0, or n where so many waypoints do not fit into the log any more; then nothing was said.
+    """
+    if room(log) < 2 or point_room(log) < n:
+        return n
+    first = take_points(log, n)
+    for i in range(n):
+        for k in range(lattice.q.shape[1]):
+            at_goal = cells[i] == BLOCKED
+            log.points[first + i, k] = lattice.goal[0, k] if at_goal else lattice.q[cells[i], k]
+    emit(log, _PATH, iteration, _RAW, first, n, cost, lattice.q, 0)
+    return 0

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from brrt.errors import RecordingError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status
+from brrt.manifest import Manifest
 from brrt.replay.forest import forest
 from brrt.replay.ledger import Changes, changes
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]

@@ -10,17 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Source, Stage
-from brrt.kernels.emit import Buffer, emit, room
-from brrt.kernels.forest import Forest, add, emit_path, emit_roots, emit_solved, fits
+from brrt.events import Kind, Reason, Source, Stage, Status
+from brrt.kernels.emit import Buffer, emit, emit_end, room
+from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
 from brrt.kernels.jit import inlined, kernel
 from brrt.kernels.kdtree import nearest
 from brrt.kernels.random import Random, uniform
 from brrt.kernels.space import distance, sample_uniform, segment_free, steer
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, POINTS, SOLVED, STATE_FULL
+from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, ENDED, LIMIT, OWN, POINTS, STATE_FULL
 
 Floats = NDArray[np.float64]
 
+SOLVED = int(Status.SOLVED)
 REJECT, SAMPLE, CONNECT = int(Kind.REJECT), int(Kind.SAMPLE), int(Kind.CONNECT)
 UNIFORM, OTHER_TREE = int(Source.UNIFORM), int(Source.OTHER_TREE)
 COLLISION, NO_PROGRESS = int(Reason.COLLISION), int(Reason.NO_PROGRESS)
@@ -135,8 +136,8 @@ def advance(
             counts[POINTS] = emit_path(forest, log, counts[DRAWS], RAW, cost, start, goal)
             if counts[POINTS] > 0:
                 return BATCH_FULL
-            emit_solved(log, counts[DRAWS])
-            return SOLVED
+            emit_end(log, counts[DRAWS], SOLVED)
+            return ENDED
         if room(log) < 2:
             return BATCH_FULL
         if not fits(forest, 1):

@@ -5,14 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Source, Stage
-from brrt.kernels.emit import Buffer, emit, room
-from brrt.kernels.forest import Forest, add, emit_path, emit_roots, emit_solved, fits
+from brrt.events import Kind, Reason, Source, Stage, Status
+from brrt.kernels.emit import Buffer, emit, emit_end, room
+from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
 from brrt.kernels.jit import inlined, kernel
 from brrt.kernels.kdtree import nearest
 from brrt.kernels.random import Random, uniform
 from brrt.kernels.space import distance, interpolate, sample_uniform, segment_free, steer
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, LIMIT, OWN, POINTS, SOLVED, STATE_FULL
+from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, ENDED, LIMIT, OWN, POINTS, STATE_FULL
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +21,7 @@ UNIFORM, GOAL = int(Source.UNIFORM), int(Source.GOAL)
 COLLISION, NO_PROGRESS = int(Reason.COLLISION), int(Reason.NO_PROGRESS)
 GOAL_BLOCKED = int(Reason.GOAL_BLOCKED)
 START_TREE, RAW = 0, int(Stage.RAW)
+SOLVED = int(Status.SOLVED)
 
 BEGUN, UNTESTED, GOAL_NODE, COUNTS = range(OWN, OWN + 4)
 """Places in `Tree.counts` of whether the root has been said, the newest node while it is not yet
@@ -118,8 +119,8 @@ def advance(
             counts[POINTS] = emit_path(forest, log, counts[DRAWS], RAW, forest.cost[goal], goal, -1)
             if counts[POINTS] > 0:
                 return BATCH_FULL
-            emit_solved(log, counts[DRAWS])
-            return SOLVED
+            emit_end(log, counts[DRAWS], SOLVED)
+            return ENDED
         if room(log) < options.slices + 3:
             return BATCH_FULL
         if not fits(forest, options.slices + 1):

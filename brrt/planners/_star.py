@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Source, Stage
-from brrt.kernels.emit import Buffer, emit, room
-from brrt.kernels.forest import Forest, add, emit_path, emit_roots, emit_solved, fits
+from brrt.events import Kind, Reason, Source, Stage, Status
+from brrt.kernels.emit import Buffer, emit, emit_end, room
+from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
 from brrt.kernels.jit import borrowing, inlined, kernel
 from brrt.kernels.kdtree import near, nearest
 from brrt.kernels.random import Random, uniform
@@ -22,11 +22,11 @@ from brrt.planners.drive import (
     BATCH_FULL,
     COUNTED,
     DRAWS,
+    ENDED,
     EVENTS,
     LIMIT,
     OWN,
     POINTS,
-    SOLVED,
     STATE_FULL,
 )
 
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 SAMPLE, REJECT, REWIRE = int(Kind.SAMPLE), int(Kind.REJECT), int(Kind.REWIRE)
-CONNECT = int(Kind.CONNECT)
+CONNECT, SOLVED = int(Kind.CONNECT), int(Status.SOLVED)
 UNIFORM, GOAL, INFORMED = int(Source.UNIFORM), int(Source.GOAL), int(Source.INFORMED)
 COLLISION, NO_PROGRESS = int(Reason.COLLISION), int(Reason.NO_PROGRESS)
 LINK_BLOCKED, NEAR_BLOCKED = int(Reason.LINK_BLOCKED), int(Reason.NEAR_BLOCKED)
@@ -394,8 +394,8 @@ def advance(
             counts[COUNTED] = counts[DRAWS]
             counts[STAGE] = _DRAW
             if options.stop_at_first and counts[PATHS] > 0:
-                emit_solved(log, counts[DRAWS])
-                return SOLVED
+                emit_end(log, counts[DRAWS], SOLVED)
+                return ENDED
         if room(log) < 6:
             return BATCH_FULL
         if not fits(star.forest, 1):

@@ -1,25 +1,21 @@
 """A* on a lattice (Hart, Nilsson and Raphael 1968)."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from brrt.errors import BrrtError
-from brrt.events import Events, Kind, Phase, Stage, Status
-from brrt.kernels.emit import EventLog
-from brrt.kernels.jit import prepared
 from brrt.kernels.lattice import (
     MOST_CELLS,
     Lattice,
-    Search,
     empty_search,
     grown_lattice,
     grown_search,
     rooted_lattice,
 )
 from brrt.planners import _a_star, contract
-from brrt.planners.planner import Planner
+from brrt.planners.drive import Loop, LoopPlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.robots import Point
@@ -28,12 +24,15 @@ from brrt.settings import param
 _FIRST_ROOM = 1 << 18
 """Cells to make room for at first, where the bounds hold more."""
 
-_ENDS = {_a_star.SOLVED: Status.SOLVED, _a_star.NO_PATH: Status.NO_PATH}
+MOST_DRAWS = 1 << 62
+"""Nothing is drawn, so no number of draws ends a search."""
 
 
 @dataclass(frozen=True, slots=True)
-class LatticePlanner(Planner):
+class LatticePlanner(LoopPlanner):
     """What the searches on a lattice have in common; its cells begin at the start."""
+
+    settled: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
 
     epsilon: float = param(0.5, "edge of a cell", above=0)
     diagonals: bool = param(False, "move to all cells around (26 in 3D), not across faces alone")
@@ -75,58 +74,18 @@ class AStar(LatticePlanner):
         grid = contract.Lattice(self.epsilon, self.diagonals, self.max_move, lookahead=None)
         return contract.Contract(lattice=grid)
 
-    def solve(
-        self,
-        problem: Problem,
-        rng: np.random.Generator,  # noqa: ARG002
-        log: EventLog,
-        stop: Stop,
-    ) -> Iterator[Events]:
-        """See `Planner.solve`; an iteration is a cell expanded."""
+    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:  # noqa: ARG002
+        """See `LoopPlanner.loop`."""
         lattice = self._lattice(problem)
-        search, counts = empty_search(len(lattice.keys)), np.array([0, -1])
-        most = stop.iterations if stop.draws is None else min(stop.iterations, stop.draws)
-
-        log.reserve(len(lattice.deltas) + 8)
-        space = problem.space
-        advance = prepared(_a_star.advance, lattice, search, counts, space, log.buffer, 0)
-        log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
-        began = log.elapsed_s
-        status = None
-        while status is None:
-            if log.overdue:
-                yield log.drain()
-            done = int(counts[_a_star.EXPANSIONS])
-            due = stop.reached(done, log.elapsed_s - began)
-            limit = done + stop.share(done) if due is None else done
-            log.tick()
-            result = advance(lattice, search, counts, space, log.buffer, min(limit, most))
-            if result == _a_star.BATCH_FULL:
-                yield log.drain()
-            elif result == _a_star.TABLE_FULL:
-                lattice, search = grown_lattice(lattice), grown_search(search)
-            elif result in _ENDS:
-                status = _ENDS[result]
-            elif due is None and counts[_a_star.EXPANSIONS] >= most:
-                status = Status.ITERATION_LIMIT
-            else:
-                status = due
-        iteration = int(counts[_a_star.EXPANSIONS])
-        if status is Status.SOLVED:
-            last = int(counts[_a_star.LAST])
-            cost, cells = _path(search, last)
-            waypoints = lattice.q[cells]
-            if lattice.h[last] > 0:
-                cost, waypoints = cost + lattice.h[last], np.vstack([waypoints, problem.goal])
-            log.emit(Kind.PATH, iteration, stage=Stage.RAW, cost=cost, waypoints=waypoints)
-        log.emit(Kind.PHASE, iteration, name=Phase.PLAN, status=status)
-        yield log.drain()
+        frontier = _a_star.Frontier(
+            lattice, empty_search(len(lattice.keys)), np.zeros(_a_star.COUNTS, np.int64)
+        )
+        frontier.counts[_a_star.LAST] = -1
+        most = len(lattice.deltas) + 1
+        return Loop(_a_star.advance, frontier, _a_star.Options(), _grown, most, MOST_DRAWS)
 
 
-def _path(search: Search, cell: int) -> tuple[float, list[int]]:
-    """Cost of a cell, and the cells from the start to it."""
-    cost, cells = float(search.g[cell]), []
-    while cell >= 0:
-        cells.append(cell)
-        cell = int(search.parent[cell])
-    return cost, cells[::-1]
+def _grown(frontier: _a_star.Frontier) -> _a_star.Frontier:
+    return frontier._replace(
+        lattice=grown_lattice(frontier.lattice), search=grown_search(frontier.search)
+    )

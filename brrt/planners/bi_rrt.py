@@ -8,7 +8,7 @@ import numpy as np
 from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
 from brrt.planners import _bi_rrt
 from brrt.planners.contract import Contract, Draws, Growth
-from brrt.planners.drive import Loop, TreePlanner
+from brrt.planners.drive import Loop, LoopPlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -17,7 +17,7 @@ _TURNS = {"alternate": _bi_rrt.ALTERNATE, "smaller": _bi_rrt.SMALLER, "coin": _b
 
 
 @dataclass(frozen=True, slots=True)
-class BiRRT(TreePlanner):
+class BiRRT(LoopPlanner):
     """Bidirectional RRT (Kuffner and LaValle 2000): one tree from the start, one from the goal.
 
     In each iteration one tree grows towards a sample, and the other one then heads for the newest
@@ -56,7 +56,7 @@ class BiRRT(TreePlanner):
         return Contract(step=step, link=step, draws=draws, growth=growth, stops=True)
 
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `TreePlanner.loop`."""
+        """See `LoopPlanner.loop`."""
         step = step_length(self.step, problem)
         options = _bi_rrt.Options(
             step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
@@ -71,7 +71,7 @@ def step_length(step: float | None, problem: Problem, part: float = 0.05) -> flo
 
 
 def loop_of(options: _bi_rrt.Options, problem: Problem, stop: Stop) -> Loop[_bi_rrt.Trees]:
-    """Make the loop of any variant; see `TreePlanner.loop`."""
+    """Make the loop of any variant; see `LoopPlanner.loop`."""
     roots = np.array([problem.start, problem.goal])
     counts = np.zeros(_bi_rrt.COUNTS, np.int64)
     counts[_bi_rrt.NEWEST + 1] = 1

@@ -32,6 +32,6 @@ class BiRRTStar(StarPlanner):
         return options._replace(link=self.connect_distance or options.step)
 
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `TreePlanner.loop`."""
+        """See `LoopPlanner.loop`."""
         roots = np.array([problem.start, problem.goal])
         return loop_of(self.options(problem), roots, problem, stop)

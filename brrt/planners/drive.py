@@ -1,4 +1,4 @@
-"""What tree planners share in Python: a compiled loop is called until the run has come to its end.
+"""What planners share in Python: a compiled loop is called until the run has come to its end.
 
 A loop is a kernel `advance(state, space, draws, log, options, limit, draw_limit)`, where `state` is
 a NamedTuple with the field `counts`. It returns one of the codes below, and goes on where it was
@@ -8,7 +8,7 @@ when it is called again.
 from abc import abstractmethod
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -20,15 +20,18 @@ from brrt.planners.planner import Planner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 
-BATCH_FULL, STATE_FULL, LIMIT, SOLVED = range(4)
+BATCH_FULL, STATE_FULL, LIMIT, ENDED = range(4)
 """Why a loop returned: the log or its own arrays are full, it has made the iterations that it was
-given, or it has said that planning has ended with a path."""
+given, or it has said that planning has ended."""
 
 DRAWS, COUNTED, EVENTS, POINTS = range(4)
 """First places of `counts`: draws made, iterations that count, and the events and waypoints that
 the log must have room for before a loop can go on, where that is more than usual."""
 OWN = 4
 """From here on a loop has places of its own."""
+
+UNCOUNTED = 10**15
+"""Iterations that no run ever makes."""
 
 State = TypeVar("State", bound=Any)
 
@@ -75,7 +78,7 @@ class Drive:
         )
         log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
         self._began = log.elapsed_s
-        self._solved = False
+        self._ended = False
 
     @property
     def counted(self) -> int:
@@ -92,11 +95,11 @@ class Drive:
 
         Returns:
             Why it ended, which nobody has said yet; None where the loop has said itself that
-            planning has ended with a path.
+            planning has ended.
         """
         loop, log, counts = self._loop, self._log, self._loop.state.counts
         draw_limit = loop.draw_limit if stop.draws is None else min(loop.draw_limit, stop.draws)
-        while not self._solved:
+        while not self._ended:
             if log.overdue:
                 yield log.drain()
             due = stop.reached(self.counted, log.elapsed_s - self._began)
@@ -106,8 +109,8 @@ class Drive:
             result = self._advance(
                 loop.state, self._space, self._draws, log.buffer, loop.options, limit, draw_limit
             )
-            if result == SOLVED:
-                self._solved = True
+            if result == ENDED:
+                self._ended = True
             elif result == BATCH_FULL:
                 yield log.drain()
                 log.reserve(int(counts[EVENTS]), int(counts[POINTS]))
@@ -145,8 +148,16 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class TreePlanner(Planner):
-    """What plans by a compiled loop."""
+class LoopPlanner(Planner):
+    """What plans by a compiled loop.
+
+    Attributes:
+        settled: Settings that cannot be others on the way.
+        onward: How a run that ended with a path can go on; empty where none can.
+    """
+
+    settled: ClassVar[tuple[str, ...]] = ()
+    onward: ClassVar[str] = ""
 
     @abstractmethod
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
@@ -157,9 +168,16 @@ class TreePlanner(Planner):
             stop: The budget, which decides how much room is made.
         """
 
-    def open_ended(self) -> Self | None:
-        """Return the planner that goes on where this one ends with a path; None if none can."""
-        return None
+    def retracing(self, problem: Problem) -> Loop[Any]:
+        """Make the loop that retraces a run: it is ended by draws alone.
+
+        Where a run that ended with a path can go on, it does not say that planning has ended.
+        """
+        return self.loop(problem, Stop(iterations=UNCOUNTED))
+
+    def ends_where(self, other: Self) -> bool:  # noqa: ARG002
+        """Whether it has ended with its path where another of its kind has."""
+        return True
 
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop

@@ -8,7 +8,7 @@ import numpy as np
 from brrt.kernels.forest import grown_forest, rooted_forest
 from brrt.planners import _rrt
 from brrt.planners.contract import Contract, Draws, Growth
-from brrt.planners.drive import Loop, TreePlanner
+from brrt.planners.drive import Loop, LoopPlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -18,7 +18,7 @@ _DRAWS_PER_ITERATION = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class RRT(TreePlanner):
+class RRT(LoopPlanner):
     """Rapidly-exploring random tree (LaValle 1998): one tree, grown from the start.
 
     Each iteration draws a configuration, steers towards it from the nearest node by at most
@@ -50,7 +50,7 @@ class RRT(TreePlanner):
         return self.step or 0.05 * problem.world.extent
 
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `TreePlanner.loop`."""
+        """See `LoopPlanner.loop`."""
         options = _rrt.Options(
             step=self._step(problem),
             goal_bias=self.goal_bias,

@@ -5,14 +5,14 @@ from typing import Any
 
 from brrt.planners.bi_rrt import BiRRT
 from brrt.planners.contract import Contract
-from brrt.planners.drive import Loop, TreePlanner
+from brrt.planners.drive import Loop, LoopPlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
 
 
 @dataclass(frozen=True, slots=True)
-class RRTConnect(TreePlanner):
+class RRTConnect(LoopPlanner):
     """RRT-Connect (Kuffner and LaValle 2000): two trees, joined greedily.
 
     One tree makes a step towards a sample, and the other one steps towards the new node until it
@@ -28,7 +28,7 @@ class RRTConnect(TreePlanner):
         return self._variant.contract(problem)
 
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `TreePlanner.loop`."""
+        """See `LoopPlanner.loop`."""
         return self._variant.loop(problem, stop)
 
     @property

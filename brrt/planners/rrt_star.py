@@ -10,7 +10,7 @@ from brrt.kernels.forest import grown, grown_forest, rooted_forest
 from brrt.planners import _star
 from brrt.planners.bi_rrt import step_length
 from brrt.planners.contract import Contract, Draws, Growth, Near
-from brrt.planners.drive import Loop, TreePlanner
+from brrt.planners.drive import UNCOUNTED, Loop, LoopPlanner
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.settings import param
@@ -21,10 +21,11 @@ looks for parents, and with so few of them a tree improves slowly."""
 
 
 @dataclass(frozen=True, slots=True)
-class StarPlanner(TreePlanner):
+class StarPlanner(LoopPlanner):
     """What RRT* has in common, with one tree and with two."""
 
     default_iterations: ClassVar[int] = 20_000
+    onward: ClassVar[str] = "let it improve on its path: --param stop_at_first=false"
 
     step: float | None = param(
         None, "longest edge; 20 % of the map's longest side by default", above=0
@@ -55,9 +56,13 @@ class StarPlanner(TreePlanner):
             stops=options.stop_at_first,
         )
 
-    def open_ended(self) -> Self:
-        """See `TreePlanner.open_ended`."""
-        return replace(self, stop_at_first=False)
+    def retracing(self, problem: Problem) -> Loop[Any]:
+        """See `LoopPlanner.retracing`."""
+        return replace(self, stop_at_first=False).loop(problem, Stop(iterations=UNCOUNTED))
+
+    def ends_where(self, other: Self) -> bool:  # noqa: ARG002
+        """See `LoopPlanner.ends_where`."""
+        return self.stop_at_first
 
     def options(self, problem: Problem) -> _star.Options:
         """Return what the loop needs, with lengths resolved for a problem."""
@@ -89,7 +94,7 @@ class RRTStar(StarPlanner):
         return StarPlanner.options(self, problem)._replace(goal_bias=self.goal_bias)
 
     def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `TreePlanner.loop`."""
+        """See `LoopPlanner.loop`."""
         return loop_of(self.options(problem), problem.start[None], problem, stop)
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brrt.colours import Colour
 from brrt.events import Table
+from brrt.manifest import Manifest
 from brrt.recording import scene
 from brrt.recording.columns import line_strips, time_columns
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 MOMENT = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Table
+from brrt.manifest import Manifest
 from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows, merged
 from brrt.recording.pages import Pages
 from brrt.recording.sketch import Sketch, Thinning
-from brrt.scenario import Manifest
 
 _IN_PLANE, _IN_SPACE = 0.42, 0.16
 """Radius of a cell's dot in edges of a cell; small in 3D, where one has to look through."""

@@ -9,6 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Status, Table
+from brrt.manifest import Manifest
 from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows
 from brrt.recording.cells import Cells
@@ -18,7 +19,6 @@ from brrt.recording.pace import Pace
 from brrt.recording.paths import Paths
 from brrt.recording.sketch import Sketch
 from brrt.recording.trees import Trees
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 _ACCEPTED = "/series/extensions/accepted"

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, table_dtype
+from brrt.manifest import Manifest
 from brrt.recording.cdr import MESSAGE, RECORD_HEAD, Layout
 from brrt.recording.mcap_end import LABELS, ending, figures_of
 from brrt.recording.mcap_records import opened, parsed, records_of
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
 from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head
-from brrt.scenario import Manifest
 
 _ANY, _TIMES = 1 << 20, 256
 """Of what a chunk unpacks to: bytes in any case, and times its size; events come to 15 times."""

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from brrt.errors import RecordingError
 from brrt.events import FIELDS, Events, Kind
+from brrt.manifest import Manifest
 from brrt.recording.cdr import Layout, definition
 from brrt.recording.container import Container
 from brrt.recording.gathering import Gathering
 from brrt.replay.metrics import Metrics
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 RUN, RESULT, WORLD = "brrt.run", "brrt.result", "world.json"

@@ -3,11 +3,11 @@
 import numpy as np
 
 from brrt.events import Events, Kind, Table
+from brrt.manifest import Manifest
 from brrt.recording import scene
 from brrt.recording.canvas import Canvas, growing_rows
 from brrt.recording.paths import draw_bodies
 from brrt.recording.sketch import Thinning, thinned
-from brrt.scenario import Manifest
 
 _IN_SPACE = (2000, 20**3)
 """In 3D, moves to cells that are drawn in full, and parts of the world with one each after that:

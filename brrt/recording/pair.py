@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from brrt.colours import Colour
 from brrt.events import Events, Kind
+from brrt.manifest import Manifest
 from brrt.recording import landscape, scene
 from brrt.recording.canvas import moments
 from brrt.recording.columns import time_columns
@@ -20,7 +21,6 @@ from brrt.recording.drawing import Drawing
 from brrt.recording.rerun import recording_id
 from brrt.recording.stream import filled, new_stream
 from brrt.replay.diff import Difference, first_difference
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 MARK: Colour = (255, 64, 216)

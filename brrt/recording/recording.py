@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from brrt.events import Events, Kind
+from brrt.manifest import Manifest
 from brrt.replay.account import account
 from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
 from brrt.replay.moment import Moment, instant
 from brrt.robots import Robot
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 

@@ -8,6 +8,7 @@ import rerun as rr
 
 from brrt.errors import RecordingError
 from brrt.events import FIELDS, Events
+from brrt.manifest import Manifest
 from brrt.recording import viewer
 from brrt.recording.columns import event_columns, time_columns
 from brrt.recording.drain import Drain
@@ -18,7 +19,6 @@ from brrt.recording.scene import application, blueprint, document
 from brrt.recording.stamp import WRITTEN, stamp
 from brrt.recording.stream import connect, new_stream
 from brrt.replay.metrics import Metrics
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 _GATHERED, _FILE_S, _VIEW_S = 1 << 15, 0.5, 0.1

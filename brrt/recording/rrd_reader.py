@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Field, Kind, Table, table_dtype
+from brrt.manifest import Manifest
 from brrt.recording.recording import Recording
 from brrt.recording.rrd_frames import opened, unpacked
 from brrt.recording.rrd_outline import END, MANIFEST, WORLD, Outline, reason
 from brrt.recording.sound import CutError, Numbering, head
-from brrt.scenario import Manifest
 
 pa: Any = pyarrow  # mypy knows none of its names
 

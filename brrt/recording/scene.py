@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from brrt.colours import GOAL, START, Colour
 from brrt.events import Reason, Source, Stage
+from brrt.manifest import Manifest
 from brrt.recording import landscape
 from brrt.robots import Robot
-from brrt.scenario import Manifest, Scenario
+from brrt.scenario import Scenario
 from brrt.worlds.world import World
 
 OTHER: Colour = (180, 120, 255)

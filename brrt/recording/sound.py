@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import FIELDS, Events, Kind, Table
-from brrt.scenario import Manifest
+from brrt.manifest import Manifest
 from brrt.worlds.convex import GREATEST
 from brrt.worlds.loaders.loader import MOST_LISTS
 from brrt.worlds.world import World
@@ -125,33 +125,38 @@ def _possible(kind: Kind, table: Table, count: int) -> None:
     Raises:
         BrrtError: One is not.
     """
-    _hold(kind, "t", table, (table["t"] < 0) | (table["t"] > _LONGEST))
-    _hold(kind, "iteration", table, (table["iteration"] < 0) | (table["iteration"] > _LONGEST))
+    _hold(kind, "t", table, 0, _LONGEST)
+    _hold(kind, "iteration", table, 0, _LONGEST)
     for field in FIELDS[kind]:
-        values = table[field.name]
         if field.choices is not None:
-            wrong = ~np.isin(values, list(field.choices))
+            # Enumerations count from 0 without a gap.
+            _hold(kind, field.name, table, 0, len(field.choices) - 1)
         elif field.type == "q[]":
-            wrong = np.array([not (len(rows) and _finite(rows).all()) for rows in values], np.bool_)
-        elif field.type == "q":
-            wrong = np.asarray(~_finite(values).all(axis=1))
-        elif field.type == "float64":
-            wrong = ~_finite(values)
-            if field.name == "h":  # where there is no way out
-                wrong &= values != np.inf
+            for at, rows in enumerate(table[field.name]):
+                if not len(rows) or _beyond(rows, -GREATEST, GREATEST).any():
+                    raise _impossible(kind, field.name, table[at])
+        elif field.type in ("q", "float64"):
+            # An estimate is infinite where there is no way out.
+            most = np.inf if field.name == "h" else GREATEST
+            _hold(kind, field.name, table, -GREATEST, most)
         elif field.type == "int32":
-            wrong = (values < -1) | (values >= _SEEN * count)
-        else:
-            continue
-        _hold(kind, field.name, table, wrong)
+            _hold(kind, field.name, table, -1, _SEEN * count - 1)
 
 
-def _finite(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(values) <= GREATEST)
+def _hold(kind: Kind, name: str, table: Table, least: float, most: float) -> None:
+    values = table[name]
+    # Two passes without a mask in the usual case; they are false of what is not a number, too.
+    if len(values) and not (values.min() >= least and values.max() <= most):
+        wrong = _beyond(values, least, most)
+        raise _impossible(kind, name, table[int(wrong.argmax())])
 
 
-def _hold(kind: Kind, name: str, table: Table, wrong: NDArray[np.bool_]) -> None:
-    if wrong.any():
-        event = table[int(wrong.argmax())]
-        value = " ".join(str(event[name]).split())[:60]
-        raise BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}")
+def _beyond(values: NDArray[Any], least: float, most: float) -> NDArray[np.bool_]:
+    """Return which of n events have a number that is out of range or none, shape (n,)."""
+    inside = (values >= least) & (values <= most)
+    return np.asarray(~inside.reshape(len(values), -1).all(axis=1))
+
+
+def _impossible(kind: Kind, name: str, event: np.void) -> BrrtError:
+    value = " ".join(str(event[name]).split())[:60]
+    return BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}")

@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from brrt.events import Events
+from brrt.manifest import Manifest
 from brrt.recording import read
 from brrt.recording.recording import Recording
 from brrt.replay.compare import Comparison, Side, compare_sides
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 Comparable = Path | str | Recording | tuple[Manifest, World, Events | Iterable[Events]]

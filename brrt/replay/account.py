@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
+from brrt.manifest import Manifest
 from brrt.robots import Robot
-from brrt.scenario import Manifest
 
 Line = tuple[int, str]
 """Iteration and text."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Table
+from brrt.manifest import Manifest
 from brrt.replay.account import choice_name
 from brrt.replay.story import When, as_plain
 from brrt.robots import Robot
-from brrt.scenario import Manifest
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from brrt.events import Events, Kind
+from brrt.manifest import Manifest
 from brrt.replay.diff import Deviation, Difference, first_difference
 from brrt.replay.metrics import Metrics
 from brrt.replay.told import Row, settings_of, versions_of
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 METRICS = (

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
-from brrt.scenario import Manifest, Scenario
+from brrt.manifest import Manifest
+from brrt.scenario import Scenario
 
 Path = tuple[float, NDArray[np.float64]]
 """Cost and waypoints."""

@@ -7,12 +7,12 @@ from typing import Protocol
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Instant, Kind
+from brrt.manifest import Manifest
 from brrt.replay.cells import CellHistory, CellTrace
 from brrt.replay.forest import Tree, forest
 from brrt.replay.history import NodeTrace
 from brrt.replay.metrics import Metrics, Path
 from brrt.replay.story import NodeHistory
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brrt.scenario import MOST, Manifest, Scenario
+from brrt.manifest import Manifest
+from brrt.scenario import MOST, Scenario
 from brrt.worlds.world import World
 
 _PLAIN = ("planner", "seed", "draws", "time", "smooth", "shortcuts", "execute", "max_move",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brrt.colours import Colour
 from brrt.errors import RecordingError
 from brrt.events import Events, Kind, Stage, Table
+from brrt.manifest import Manifest
 from brrt.recording import scene
 from brrt.recording.foxglove.lifetimes import BATCH, tell
 from brrt.recording.foxglove.messages import MARKER, Marker, Shape
@@ -25,7 +26,6 @@ from brrt.recording.foxglove.scenery import (
 )
 from brrt.replay.forest import forest
 from brrt.replay.ledger import changes
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.colours import GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, Colour
+from brrt.manifest import Manifest
 from brrt.recording.foxglove.messages import MAP, MARKERS, Marker, Shape, array, occupancy
 from brrt.robots import Robot
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 _POINT = 0.0012

@@ -13,6 +13,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from brrt.events import Events
+from brrt.manifest import Manifest
 from brrt.planners.contract import Contract
 from brrt.replay.checks import (
     acts,
@@ -26,17 +27,17 @@ from brrt.replay.checks import (
     rewiring,
     searches,
     trees,
+    walk,
 )
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.tally import Finding, Tally
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
     *log.RULES, *acts.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES,
-    *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
+    *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *walk.RULES, *searches.RULES,
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
+from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
 from brrt.planners.contract import Contract
 from brrt.replay.checks.keeping import Kept
@@ -26,7 +27,6 @@ from brrt.replay.ledger import (
     merged,
     sum_up,
 )
-from brrt.scenario import Manifest
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]

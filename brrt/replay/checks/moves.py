@@ -127,7 +127,7 @@ def paths_walked(case: Case, tally: Tally) -> None:
         untold[:1], np.ones(len(untold[:1]), bool),
         lambda i: f"trial {untold['trial'][i]} begins; {len(case.found)} before it arrived",
     )  # fmt: skip
-    trials = case.manifest.scenario.settings().get("trials", 1)
+    trials = case.manifest.stretches[-1][1].settings().get("trials", 1)
     if case.outcome is Status.SOLVED and len(case.found) < trials:
         tally.one(None, f"{len(case.found)} of {trials} trials arrived")
 

@@ -215,7 +215,10 @@ def goal_taken(case: Case, tally: Tally) -> None:
     near = np.flatnonzero(far < lattice.max_move * (1 - CLOSE) - case.blur)
     some, a = table[near], q[near]
     clear = all_clear(case.obstacles, case.robot, a, np.broadcast_to(case.goal, a.shape))
-    ends = np.append(table["seq"][1:], 1 << 62)[near]
+    ends = np.append(table["seq"][1:], 1 << 62)
+    # Who goes on with another lookahead plans anew.
+    ends[:-1][np.diff(case.stretch(table)) > 0] = 1 << 62
+    ends = ends[near]
     moves = case.events[Kind.MOVE]
     # From a cell at the goal there is no move to make; the path is told all the same.
     moved = moves["seq"][(np.asarray(moves["q"]) == case.goal).all(axis=1)]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source
+from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
 from brrt.planners.contract import Contract
 from brrt.replay.account import choice_name
@@ -14,7 +15,7 @@ from brrt.replay.explain.gather import FAILED, Gather
 from brrt.replay.explain.places import Blocker, Coverage, Gap, Narrow, Places, Spot
 from brrt.replay.story import as_plain
 from brrt.robots import Robot
-from brrt.scenario import Manifest, Scenario
+from brrt.scenario import Scenario
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]

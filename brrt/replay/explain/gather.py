@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status, Table, table_dtype
+from brrt.manifest import Manifest
 from brrt.replay.explain.lattice import Cells
 from brrt.replay.metrics import Metrics
 from brrt.robots import Robot
-from brrt.scenario import Manifest
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
