@@ -56,6 +56,16 @@ class Branch:
         return cls(**known)
 
 
+def _scenario(text: str) -> Scenario:
+    """Read a scenario that names what was run: what is missing would be taken for the usual."""
+    values = json.loads(text)
+    scenario = Scenario.parse(values)
+    for name in ("world", "planner"):
+        if name not in values:
+            raise BrrtError(f"the manifest is damaged: its scenario has no {name}")
+    return scenario
+
+
 def _said(value: Any) -> str:
     """Write a setting; where it is not given, the run decides."""
     if isinstance(value, bool):
@@ -149,7 +159,7 @@ class Manifest:
             )
         try:
             return cls(
-                Scenario.parse(json.loads(texts["scenario"])),
+                _scenario(texts["scenario"]),
                 tuple(map(float, json.loads(texts["start"]))),
                 tuple(map(float, json.loads(texts["goal"]))),
                 int(texts["dim"]),
@@ -159,5 +169,7 @@ class Manifest:
                 texts.get("robot"),
                 tuple(map(Branch.parse, json.loads(texts.get("branches", "[]")))),
             )
-        except (KeyError, ValueError, TypeError, RecursionError) as error:
+        except KeyError as error:
+            raise BrrtError(f"the manifest is damaged: it has no {error}") from None
+        except (ValueError, TypeError, RecursionError) as error:
             raise BrrtError(f"the manifest is damaged: {error!r}") from None

@@ -81,6 +81,7 @@ class Run:
         self._compile()
         self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
         self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
+        self._gone = False
         self.stop = scenario.make_stop()
         self.manifest = Manifest(
             scenario=scenario,
@@ -108,7 +109,14 @@ class Run:
                 pass
 
     def events(self) -> Iterator[Events]:
-        """Plan, smooth, drive; yield what happens, in batches."""
+        """Plan, smooth, drive; yield what happens, in batches.
+
+        Raises:
+            BrrtError: The run has gone already.
+        """
+        if self._gone:
+            raise BrrtError("a run goes once; make another brrt.Run(scenario) to run it again")
+        self._gone = True
         path, moved, iteration = None, False, 0
         for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):
             path = _last_path(batch, path)

@@ -172,6 +172,7 @@ MANIFESTS: dict[str, tuple[dict[str, str], str]] = {
     "other dof": ({"dof": "3"}, "start has 2 numbers, and not 3"),
     "other dim": ({"dim": "3"}, "its world is 2D, and not 3D"),
     "epoch": ({"epoch_ns": "9" * 40}, "ns after 1970"),
+    "no planner": ({"scenario": '{"world": "w"}'}, "its scenario has no planner"),
     "no epoch": ({"epoch_ns": "1e9"}, "the manifest is damaged"),
     "long number": ({"dof": "9" * 5000}, "the manifest is damaged"),
     "recursion": ({"scenario": "[" * 200_000}, "the manifest is damaged"),

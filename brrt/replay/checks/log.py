@@ -120,8 +120,9 @@ def outcome(case: Case, tally: Tally) -> None:
 
 def _with_path(case: Case) -> set[Status]:
     """How planning may end where there is a path: who improves it, or tries again, has a budget."""
-    trials = case.manifest.scenario.settings().get("trials", 1)
-    if case.contract.near is None and case.known and trials == 1:
+    stretches = case.manifest.stretches
+    again = any(scenario.settings().get("trials", 1) > 1 for _, scenario in stretches)
+    if case.contract.near is None and case.known and not again:
         return {Status.SOLVED, Status.INTERRUPTED}
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
 
