@@ -1,6 +1,6 @@
 """Doctor sound recordings, one event at a time, and see which share of the lies is found.
 
-    python benchmarks/doctor.py [--runs 70] [--each 3] [--seed 0] [--planner NAME] [--show X.WAY]
+    python benchmarks/doctor.py [--runs 70] [--each 3] [--seed 0] [--robot KIND] [--show X.WAY]
 
 Runs are drawn as benchmarks/soak.py draws them, those that say between 60 and 2,500 events. In each
 a random event of each kind is doctored in each way: a number off by a thousandth, another node,
@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from brrt import Events, Kind, Memory, Run, Scenario
 from brrt.replay.checks import examine
 from tests.doctoring import doctors
-from tests.scenarios import PLANNERS, command, draw
+from tests.scenarios import PLANNERS, ROBOTS, SEARCHES, command, draw
 
 LEAST, MOST = 60, 2500
 """Events of runs that are doctored."""
@@ -37,11 +37,16 @@ def found(run: Run, log: Events) -> bool:
     return any(tally.broken for tally in examine(run.manifest, run.problem.world, log))
 
 
-def runs(seed: int, count: int, planners: list[str], folder: Path) -> Iterator[tuple[Run, Events]]:
+def runs(
+    seed: int, count: int, planners: list[str], robot: str | None, folder: Path
+) -> Iterator[tuple[Run, Events]]:
     """Yield runs that are neither short nor long, as many of each planner."""
     for n in range(count):
         while True:
-            scenario = draw(seed, folder, planners[n % len(planners)])
+            planner = planners[n % len(planners)]
+            body = robot is not None and not robot.startswith("point")
+            kind = None if planner in SEARCHES and body else robot
+            scenario = draw(seed, folder, planner, kind)
             seed += 1
             memory, run = Memory(), Run(replace(scenario, clock="logical"))
             run.execute([memory])
@@ -67,13 +72,15 @@ def main() -> int:
     parser.add_argument("--each", type=int, default=3, help="events of each kind, for each way")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--planner", choices=PLANNERS, action="append")
+    parser.add_argument("--robot", choices=ROBOTS)
     parser.add_argument("--show", help="kind and way, as in edge.parent")
     parser.add_argument("--folder", type=Path, default=Path("doctor"))
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(args.seed)
     counts: dict[tuple[Kind, str], Counter[str]] = {}
-    for run, log in runs(args.seed, args.runs, args.planner or list(PLANNERS), args.folder):
+    planners = args.planner or list(PLANNERS)
+    for run, log in runs(args.seed, args.runs, planners, args.robot, args.folder):
         for kind, way, doctor in doctors(log):
             wanted = f"{kind.label}.{way}"
             if args.show not in (None, wanted):
