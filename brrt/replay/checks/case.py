@@ -162,7 +162,8 @@ class Case:
     @cached_property
     def scripts(self) -> Scripts:
         """The log's events in one table, iteration by iteration, for rules that read it so."""
-        return Scripts(self.dof, {first for first, _ in self.stretches})
+        growing = any(contract.growth is not None for _, contract in self.stretches)
+        return Scripts(self.dof, {first for first, _ in self.stretches}, growing=growing)
 
     @cached_property
     def events(self) -> Events:
