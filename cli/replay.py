@@ -113,8 +113,9 @@ def replay(
         verdict = {"equal": first is None, "first": None if first is None else str(first)}
         print_json(figures if check is None else {**figures, "check": verdict})
     elif told is None:
+        grown = trees.figures()  # where they are no trees, nothing is told of the run
         print_summary(figures, recording.manifest.origins)
-        _show_trees(trees.figures())
+        _show_trees(grown)
         if at_event is not None and newest.next:
             print_lines(["", *event_lines(newest.before(newest.next))])
     else:

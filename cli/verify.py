@@ -92,6 +92,8 @@ def verify(
             }
         )
     else:
+        if cut and not saved.cut:
+            note(f"{run} breaks off; what is promised of a run's end was left out")
         if planner not in PLANNERS:
             note(f"planner {planner} is not known here; its special promises were not checked")
         _show(run, tallies, long=long)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events
+from brrt.files import is_there
 from brrt.recording.container import MAGIC
 from brrt.recording.mcap_reader import read_mcap
 from brrt.recording.mcap_writer import McapSink
@@ -47,6 +48,8 @@ def _opened(given: Path | str) -> Recording:
     except TypeError:
         raise BrrtError(f"read takes the name of a file, not {type(given).__name__}") from None
     try:
+        if not (path.is_file() or path.is_dir()) and is_there(path):
+            raise RecordingError(f"{path}: no file but a pipe or a device; save it to a file first")
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))
     except OSError as error:

@@ -16,6 +16,7 @@ from brrt.events import Events
 from brrt.manifest import Manifest
 from brrt.planners.contract import Contract
 from brrt.replay.checks import (
+    acts,
     draws,
     growth,
     lattice,
@@ -26,6 +27,7 @@ from brrt.replay.checks import (
     rewiring,
     searches,
     trees,
+    walk,
 )
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.tally import Finding, Tally
@@ -34,8 +36,8 @@ from brrt.worlds.world import World
 Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
-    *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
+    *log.RULES, *acts.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES,
+    *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *walk.RULES, *searches.RULES,
 )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """What rules look at."""
 
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
@@ -145,9 +145,8 @@ class Case:
         Raises:
             BrrtError: Its query is of no use in its world.
         """
-        scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
-        problem = scenario.make_problem(world)
-        known = contract is not None or scenario.planner in PLANNERS
+        problem = manifest.make_problem(world)
+        known = contract is not None or manifest.scenario.planner in PLANNERS
         stretches: tuple[tuple[int, Contract], ...] = ((0, contract or Contract()),)
         if contract is None and known:
             stretches = tuple(
@@ -163,7 +162,8 @@ class Case:
     @cached_property
     def scripts(self) -> Scripts:
         """The log's events in one table, iteration by iteration, for rules that read it so."""
-        return Scripts(self.dof, {first for first, _ in self.stretches})
+        growing = any(contract.growth is not None for _, contract in self.stretches)
+        return Scripts(self.dof, {first for first, _ in self.stretches}, growing=growing)
 
     @cached_property
     def events(self) -> Events:
