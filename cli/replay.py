@@ -98,9 +98,10 @@ def replay(
         _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
         return
     metrics = Metrics(recording.manifest)
-    trees, newest = Growth(), Newest()
+    trees = Growth()
+    newest = [] if at_event is None else [Newest()]
     told = Account(recording.manifest, recording.robot()) if text else None
-    folds: list[Any] = [told] if told else [] if as_json else [trees, newest]
+    folds: list[Any] = [told] if told else [] if as_json else [trees, *newest]
     end = feed(Saved(recording, partial=partial, verb=_VERB), [metrics, *folds], limits)
     if end is not None:
         _note_end(limits, *end)
@@ -116,8 +117,8 @@ def replay(
         grown = trees.figures()  # where they are no trees, nothing is told of the run
         print_summary(figures, recording.manifest.origins)
         _show_trees(grown)
-        if at_event is not None and newest.next:
-            print_lines(["", *event_lines(newest.before(newest.next))])
+        for each in newest:
+            print_lines(event_lines(each.before(each.next)))
     else:
         print_lines(told.lines())
     if golden is not None and not as_json:

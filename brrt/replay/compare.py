@@ -111,9 +111,10 @@ class Comparison:
 
     def __repr__(self) -> str:
         a, b = (name or letter for name, letter in zip(self.names, "AB", strict=True))
-        parted = "" if self.first is None else f", events from number {self.first.seq:,} on"
-        differ = f"{len(self.settings)} settings differ{parted}"
-        return f"<Comparison of {a} and {b}: {'equal' if self.equal else differ}>"
+        parts = [f"{len(self.settings)} settings differ"] if self.settings else []
+        if self.first is not None:
+            parts.append(f"events part at {self.first.seq:,}")
+        return f"<Comparison of {a} and {b}: {', '.join(parts) or 'equal'}>"
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as `brrt diff --json` prints it."""

@@ -70,7 +70,7 @@ def instant(
     for name, value in chosen.items():
         if not _counts(value) or not value < _FOREVER or (name != "time" and value != int(value)):
             what = "seconds from 0 on" if name == "time" else "a whole number from 0 on"
-            raise BrrtError(f"{name} must be {what}, not {value!r}")
+            raise BrrtError(f"{name} must be {what}, not {value!r:.60}")
     if time is not None:
         return {"t": round(time * 1e9)}
     return {"seq" if name == "event" else name: int(value) for name, value in chosen.items()}
@@ -90,7 +90,7 @@ def check_limits(limits: Mapping[str, Any], *others: str) -> None:
         if name not in _COLUMNS:
             raise unknown("argument", name, (*others, *_COLUMNS))
         if value is not None and not (_counts(value) and value == int(value)):
-            raise BrrtError(f"{name} must be a whole number from 0 on, not {value!r}")
+            raise BrrtError(f"{name} must be a whole number from 0 on, not {value!r:.60}")
 
 
 def _counts(value: Any) -> bool:

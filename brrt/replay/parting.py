@@ -42,9 +42,12 @@ def event_lines(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Tell an event in full, the last one given, and those ahead of it briefly.
 
     Args:
-        events: In order, fields by name with `seq` and `kind`; at least one.
+        events: In order, fields by name with `seq` and `kind`.
     """
+    if not events:
+        return
     *before, last = events
+    yield ""
     digits = len(f"{last['seq']:,}")
     yield f"event {last['seq']:,}" + (", and those ahead of it:" if before else ":")
     for event in before:

@@ -122,8 +122,9 @@ def _parting(found: Comparison) -> Iterator[str]:
     first = found.first
     if first is None:
         how = f"numbers within {found.tolerance:g}" if found.tolerance else "to the last bit"
-        but = "; the settings alone differ" if found.settings else ""
-        yield f"The events are equal, {how}, but for the times{but}."
+        yield f"The events are equal, {how}, but for the times."
+        if found.settings:
+            yield "The settings alone differ."
         return
     yield from parting(first, ("A", "B"), (found.cuts[0] is not None, found.cuts[1] is not None))
     if all(found.names):
