@@ -131,7 +131,7 @@ def test_disk_that_fills_up(threaded: bool, tmp_path: Path) -> None:
     events, error = saved(path)
     assert isinstance(error, CutError)
     assert path.stat().st_size < 20_000
-    assert str(error) == f"{path}: the file is cut at byte {path.stat().st_size:,}"
+    assert error.fault == f"{path}: the file is cut at byte {path.stat().st_size:,}"
     assert 0 < len(events) < len(log)
     assert begins(log, events)
 
