@@ -74,7 +74,7 @@ def verify(
     # A file that brrt recover made breaks off too, though it is whole.
     tallies = examine(
         recording.manifest, recording.world, saved,
-        cut=lambda: saved.cut or recording.result is None,
+        cut=lambda: saved.cut or recording.result is None, figures=recording.result,
     )  # fmt: skip
     cut, events = saved.cut or recording.result is None, saved.events
     broken = sum(tally.broken for tally in tallies)

@@ -1,6 +1,7 @@
 """Clean runs keep every promise; each rule finds the log that was doctored against it."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
@@ -16,6 +17,7 @@ from brrt import Events, Kind, Manifest, McapSink, Memory, Run, Scenario, World,
 from brrt.events import Phase, Reason, Status, table_dtype
 from brrt.planners.contract import Contract, Near
 from brrt.replay.checks import RULES, examine
+from brrt.replay.metrics import Metrics
 
 from . import scenarios
 from .conftest import Result
@@ -33,10 +35,12 @@ class Evidence:
     world: World
     log: Events
     contract: Contract | None
+    figures: Mapping[str, Any] | None = None
 
     def broken(self) -> set[str]:
         """Names of the rules that find something."""
-        tallies = examine(self.manifest, self.world, self.log, self.contract)
+        case = self.manifest, self.world, self.log, self.contract
+        tallies = examine(*case, figures=self.figures)
         for tally in tallies:
             assert tally.broken >= len(tally.findings) > 0 or not tally.broken
             assert all(found.rule == tally.rule and found.message for found in tally.findings)
@@ -73,6 +77,14 @@ class Evidence:
         for table in tables.values():
             table["seq"][table["seq"] > gone] -= 1
         return replace(self, log=Events(self.log.dof, {k: t for k, t in tables.items() if len(t)}))
+
+    def state(self, name: str, value: Any) -> "Evidence":
+        """Put another figure down at the end."""
+        metrics = Metrics(self.manifest)
+        metrics.write(self.log)
+        figures = json.loads(json.dumps(metrics.as_dict()))
+        assert name in figures
+        return replace(self, figures={**figures, name: value})
 
     def with_ball(self, where: Any) -> "Evidence":
         """Put a tiny ball there."""
@@ -295,6 +307,11 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("phases", "rrt", lambda c: c.edit(Kind.PHASE, 3, name=77), set()),
     ("phases", "rrt", lambda c: c.drop(Kind.PHASE, 0), {"phase contents"}),
     ("names", "rrt", lambda c: c.edit(Kind.SAMPLE, 3, source=99), set()),
+    ("figures", "rrt", lambda c: c.state("path_cost", 1.0), set()),
+    ("figures", "rrt", lambda c: c.state("path_cost", None), set()),
+    ("figures", "rrt-star", lambda c: c.state("solved", False), set()),
+    ("figures", "lrta-star", lambda c: c.state("moves", 7), set()),
+    ("figures", "a-star", lambda c: c.state("path", [[0.0, 0.0]]), set()),
     ("outcome", "rrt", lambda c: c.edit(Kind.PHASE, 1, status=Status.ITERATION_LIMIT),
      {"endings"}),
     ("outcome", "march", lambda c: c.drop(Kind.PATH, 0), {"moves along path"}),

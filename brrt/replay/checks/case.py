@@ -1,6 +1,6 @@
 """What rules look at."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -111,6 +111,8 @@ class Case:
             than one where a run went on from a recorded one with other settings.
         known: Whether the planner is known here, so that there is a contract.
         breaks_off: Says, once the log was read, whether it breaks off.
+        figures: What stands at the recording's end, under the names of `Metrics`; None where
+            nothing does.
     """
 
     manifest: Manifest
@@ -125,6 +127,7 @@ class Case:
     stretches: tuple[tuple[int, Contract], ...]
     known: bool
     breaks_off: Callable[[], bool]
+    figures: Mapping[str, Any] | None = None
 
     @classmethod
     def of(
@@ -133,6 +136,7 @@ class Case:
         world: World,
         contract: Contract | None = None,
         breaks_off: Callable[[], bool] = lambda: False,
+        figures: Mapping[str, Any] | None = None,
     ) -> Self:
         """Open the case of a recording.
 
@@ -141,6 +145,7 @@ class Case:
             world: The run's.
             contract: What the planner promises; by default what the registered one does.
             breaks_off: Says, once the log was read, whether it breaks off.
+            figures: What stands at the recording's end.
 
         Raises:
             BrrtError: Its query is of no use in its world.
@@ -156,7 +161,7 @@ class Case:
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
             manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
-            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off,
+            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off, figures,
         )  # fmt: skip
 
     @cached_property

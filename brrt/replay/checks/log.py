@@ -1,6 +1,8 @@
 """Rules about any log: how it is numbered, what it says of its phases, what lies in bounds."""
 
+import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.replay.checks.bodies import endless
 from brrt.replay.checks.case import CLOSE, Case, Windows, waypoints
 from brrt.replay.checks.tally import Tally
+from brrt.replay.metrics import Metrics
 
 _TICK_S = 1e-3
 """A real clock is read so often, at least."""
@@ -215,6 +218,33 @@ def _left(case: Case) -> str | None:
     return None if made >= limit or spent else f"planning made {made:,} of {limit:,} iterations"
 
 
+def figures(case: Case, tally: Tally) -> Windows:
+    """The figures at a recording's end are those of its events; numbers may be rounded."""
+    stated = case.figures
+    metrics = None if stated is None else Metrics(case.manifest)
+    while (window := (yield)) is not None:
+        if metrics is not None:
+            metrics.write(window)
+    if stated is None or metrics is None:
+        return
+    for name, figure in metrics.as_dict().items():
+        if name in stated:
+            wrong = not _same_figure(stated[name], figure)
+            said = " ".join(f"{name} is {stated[name]!r}, by the events {figure!r}".split())
+            tally.one(None, f"{said:.160}" if wrong else None)
+
+
+def _same_figure(a: Any, b: Any) -> bool:
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(map(_same_figure, a, b))
+    if isinstance(a, float) or isinstance(b, float):
+        try:
+            return math.isclose(a, b, rel_tol=CLOSE)
+        except TypeError:
+            return False
+    return type(a) is type(b) and bool(a == b)
+
+
 def bounds(case: Case, tally: Tally) -> Windows:
     """Samples, nodes, cells, moves and waypoints lie in bounds, joint limits and [-pi, pi).
 
@@ -241,5 +271,5 @@ def text(q: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(q).tolist()) + ")"
 
 
-RULES = (numbering, times, phases, names, outcome, budget, endings, bounds)
+RULES = (numbering, times, phases, names, outcome, budget, endings, figures, bounds)
 """All rules of this file; see `brrt.replay.checks`."""
