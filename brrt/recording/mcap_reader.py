@@ -60,11 +60,10 @@ def read_mcap(path: Path) -> Recording:
                     return Recording(manifest, world, batches, result, counts)
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
-    missing = f"metadata {RUN}" if texts is None else f"attachment {WORLD}"
     raise RecordingError(
-        f"{path}: an MCAP file, but no {missing} stands ahead of its first chunk: not a recording "
-        f"of brrt, or one that another tool rewrote; read the file that it was made of, or let the "
-        f"tool write metadata {RUN} and then attachment {WORLD} first"
+        f"{path}: an MCAP file, but not a recording of brrt, or one that another tool rewrote: "
+        f"metadata {RUN} and behind it attachment {WORLD} must stand ahead of the first chunk; read "
+        "the file that it was made of, or have the tool write them first"
     )
 
 

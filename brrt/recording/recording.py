@@ -36,7 +36,7 @@ class Recording:
 
     def __repr__(self) -> str:
         scenario, result = self.manifest.scenario, self.result
-        end = "ends ahead of its run's end"
+        end = "no figures at its end"
         if result is not None:
             end = f"{result.get('events')} events, {result.get('status')}"
         run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"

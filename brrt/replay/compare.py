@@ -43,7 +43,8 @@ class Side:
         batches: Its events, in order; where the figures are known, read no further than needed.
         result: The figures that its writer found; None where it did not get to the end.
         counts: Events of each kind, as its writer counted them; None where it is not known.
-        cut: Whether it is a recording that ends ahead of its run's end.
+        cut: Whether it is a recording without figures: it ends ahead of its run's end, unless it
+            has counts and its last phase has ended, as what other programs write.
     """
 
     name: str
@@ -179,8 +180,9 @@ class _Reader:
 
     def cut(self) -> Cut | None:
         """Return how far the recording goes, where it ends ahead of its run's end."""
-        events = sum(self._metrics.counts.values())
-        return Cut(events, self._last_t / 1e9) if self._cut else None
+        if not self._cut or (self._side.counts is not None and not self._metrics.breaks_off):
+            return None
+        return Cut(sum(self._metrics.counts.values()), self._last_t / 1e9)
 
     def figures(self) -> Mapping[str, Any]:
         """Return the run's figures: its own fold where it was read to its end."""
