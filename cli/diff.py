@@ -22,7 +22,8 @@ def diff(
 ) -> None:
     """Compare two runs: settings, versions, outcome, figures, and the first event that differs.
 
-    Times, versions and names of files do not count.
+    Times, versions and names of files do not count. The figures of a file that was cut are those up
+    to the cut, and it is said to be cut.
 
     Exit code 0: settings and events are equal; 1: something differs.
 

@@ -63,9 +63,13 @@ def replay(
 ) -> None:
     """Rebuild the trees and the figures of a run from its recording.
 
+    With --at-event the event itself is told as well, and the ones ahead of it.
+
     brrt replay run.mcap
 
     brrt replay run.mcap --at 20ms
+
+    brrt replay run.mcap --at-event 403
 
     brrt replay run.mcap --text
 

@@ -62,8 +62,8 @@ def read_mcap(path: Path) -> Recording:
                 break
     raise RecordingError(
         f"{path}: an MCAP file, but not a recording of brrt, or one that another tool rewrote: "
-        f"metadata {RUN} and behind it attachment {WORLD} must stand ahead of the first chunk; read "
-        "the file that it was made of, or have the tool write them first"
+        f"metadata {RUN} and behind it attachment {WORLD} must stand ahead of the first chunk; "
+        "read the file that it was made of, or have the tool write them first"
     )
 
 
