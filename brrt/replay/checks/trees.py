@@ -14,6 +14,10 @@ from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions
 Floats = NDArray[np.float64]
 
 
+_EDGE = "the edge to node", "node"
+"""What is said of a motion that is not free, and the field with its number."""
+
+
 def nodes(case: Case, tally: Tally) -> None:
     """Nodes join a tree as 0, 1, 2 ... below a node that is there."""
     for tree in case.trees:
