@@ -1,6 +1,6 @@
 """Kill runs while they record, and spoil recordings: what is left, and what does a reader say?
 
-    python benchmarks/faults.py [--kills 200] [--copies 2000] [--seed 0]
+    python benchmarks/faults.py [--kills 200] [--copies 2000] [--seed 0] [--first 0]
 
 Kills: a run that records at full speed into both files is killed (SIGKILL) at a random moment. It
 notes how many events it has handed over, and the time of the last. Of each file that is left, the
@@ -11,6 +11,9 @@ mcap take.
 Copies: bytes are flipped, blocks swapped, doubled, blanked or cut off, in files of runs that ended
 and of runs that were killed. Each copy must read as the original does, or as the beginning of it
 and an error of one line, within 5 seconds. Exit code 1 if anything else happens.
+
+Each kill and each copy is drawn by its own number, so that `--first 120` goes on where a run of
+this script was stopped. What is found is printed at once; how far it is, on stderr.
 """
 
 import argparse
@@ -24,6 +27,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -47,6 +51,7 @@ SMALL = (
 )
 PATIENCE_S = 5.0
 LOSS_S, CHUNK = 1.0, 1 << 16
+TELL_EACH, INTERRUPTED = 20, 130
 MEMORY = 6 << 30
 
 
@@ -104,13 +109,15 @@ def saved(path: Path) -> tuple[Events | None, str | None]:
 def command(*args: object) -> tuple[int, str]:
     """Run `brrt` in this process; return its exit code and what it said."""
     (script,) = entry_points(group="console_scripts", name="brrt")
-    told = io.StringIO()
-    with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         try:
             script.load()([str(arg) for arg in args])
         except SystemExit as ended:
-            return int(ended.code or 0), told.getvalue()
-    return 0, told.getvalue()
+            if ended.code == INTERRUPTED:
+                raise KeyboardInterrupt from None
+            return int(ended.code or 0), said.getvalue()
+    return 0, said.getvalue()
 
 
 def judge_kill(folder: Path, figures: Counter[str]) -> list[str]:
@@ -156,9 +163,9 @@ def judge_recovery(path: Path, events: Events) -> list[str]:
         wrong.append(f"{whole.name} differs: {error}")
     if len(events):
         for args in (("replay", whole), ("verify", whole), ("replay", path, "--partial")):
-            code, told = command(*args)
+            code, said = command(*args)
             if code:
-                wrong.append(f"brrt {args[0]} {args[1].name}: exit code {code}: {told[-200:]}")
+                wrong.append(f"brrt {args[0]} {args[1].name}: exit code {code}: {said[-200:]}")
     if path.suffix == ".mcap":
         with whole.open("rb") as file:
             summary = make_reader(file, validate_crcs=True).get_summary()
@@ -169,25 +176,29 @@ def judge_recovery(path: Path, events: Events) -> list[str]:
     return wrong
 
 
-def kills(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
-    """Kill so many runs; return what is wrong with what they left."""
-    findings = []
+def draws(seed: int, what: str, number: int) -> random.Random:
+    """The draws of one kill or copy, which do not depend on those before it."""
+    return random.Random(f"{seed} {what} {number}")  # noqa: S311 - no secret
+
+
+def kills(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
+    """Kill a run for each number; yield what is wrong with what they left."""
     with Popen(
         [sys.executable, __file__, "--nursery"], stdin=PIPE, stdout=PIPE, text=True
     ) as process:
         orders, answers = cast("IO[str]", process.stdin), cast("IO[str]", process.stdout)
-        for number in range(count):
+        for number in told(numbers, "kills"):
             with tempfile.TemporaryDirectory() as name:
                 orders.write(f"{name}\n")
                 orders.flush()
                 child = int(answers.readline())
-                time.sleep(rng.uniform(0, 2.0))
+                time.sleep(draws(seed, "kill", number).uniform(0, 2.0))
                 os.kill(child, signal.SIGKILL)
                 answers.readline()
                 wrong = judge_kill(Path(name), figures)
-            findings += [f"kill {number}: {line}" for line in wrong]
+            figures["killed"] += 1
+            yield from (f"kill {number}: {line}" for line in wrong)
         orders.close()
-    return findings
 
 
 def spoiled(data: bytes, rng: random.Random) -> tuple[str, bytes]:
@@ -255,13 +266,14 @@ def judge_copy(path: Path, original: Original) -> tuple[str, str | None]:
     return "harmless", None
 
 
-def originals(folder: Path, rng: random.Random) -> list[Path]:
+def originals(folder: Path, seed: int) -> list[Path]:
     """Record some runs, in small batches; take the end off copies, as a kill does."""
     found = []
     for number, scenario in enumerate(SMALL):
         place = folder / str(number)
         place.mkdir()
         record(scenario, place, batch=250)
+        rng = draws(seed, "original", number)
         for name in NAMES:
             data = (place / name).read_bytes()
             killed = place / f"killed-{name}"
@@ -270,23 +282,22 @@ def originals(folder: Path, rng: random.Random) -> list[Path]:
     return found
 
 
-def copies(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
-    """Spoil so many copies; return what is wrong with how they read."""
-    findings = []
+def copies(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
+    """Spoil a copy for each number; yield what is wrong with how they read."""
     with tempfile.TemporaryDirectory() as name:
-        sources = [Original.of(path) for path in originals(Path(name), rng)]
-        for number in range(count):
+        sources = [Original.of(path) for path in originals(Path(name), seed)]
+        for number in told(numbers, "copies"):
             source = sources[number % len(sources)]
-            way, data = spoiled(source.data, rng)
+            way, data = spoiled(source.data, draws(seed, "copy", number))
             path = Path(name, f"copy{source.path.suffix}")
             path.write_bytes(data)
             began = time.perf_counter()
             try:
                 outcome, wrong = judge_copy(path, source)
                 if number % 10 == 0:
-                    code, told = command("replay", path, "--json")
-                    if code not in (0, 2) or (code == 2 and told.count("\n") != 1):
-                        wrong = f"brrt replay: exit code {code}: {told[-200:]}"
+                    code, said = command("replay", path, "--json")
+                    if code not in (0, 2) or (code == 2 and said.count("\n") != 1):
+                        wrong = f"brrt replay: exit code {code}: {said[-200:]}"
             except Exception as error:  # noqa: BLE001 - a crash is a finding like any other
                 outcome, wrong = "crash", f"{type(error).__name__}: {error}"
             took = time.perf_counter() - began
@@ -297,7 +308,43 @@ def copies(count: int, rng: random.Random, figures: Counter[str]) -> list[str]:
             if wrong:
                 keep = Path(tempfile.gettempdir(), f"fault-{number}{path.suffix}")
                 keep.write_bytes(data)
-                findings.append(f"copy {number} ({way} of {source.path.name}): {wrong}; see {keep}")
+                yield f"copy {number} ({way} of {source.path.name}): {wrong}; see {keep}"
+
+
+def told(numbers: range, what: str) -> Iterator[int]:
+    """Yield the numbers; say on stderr how far it is, and how to go on once it was stopped."""
+    began = time.perf_counter()
+    for number in numbers:
+        done = number - numbers.start
+        last = number == numbers.stop - 1
+        if sys.stderr.isatty() or done % TELL_EACH == 0 or last:
+            passed = time.perf_counter() - began
+            left = f", {passed / done * (len(numbers) - done):.0f} s left" if done else ""
+            line = f"{what}: {number:,} of {numbers.stop:,} after {passed:.0f} s{left}"
+            end = "\n" if last or not sys.stderr.isatty() else ""
+            sys.stderr.write(f"\r{line:60}{end}" if sys.stderr.isatty() else f"{line}{end}")
+            sys.stderr.flush()
+        try:
+            yield number
+        except GeneratorExit:
+            sys.stderr.write(f"\nstopped; go on with --first {number}\n")
+            raise
+
+
+def look_at(what: Callable[..., Iterator[str]], numbers: range, seed: int) -> int:
+    """Print each finding as it comes, then the figures, also where it was stopped; count them."""
+    figures: Counter[str] = Counter()
+    findings, began = 0, time.perf_counter()
+    try:
+        for finding in what(numbers, seed, figures):
+            findings += 1
+            print(finding, flush=True)
+    finally:
+        passed = time.perf_counter() - began
+        print(f"{what.__name__} {numbers.start:,} to {numbers.stop:,} in {passed:.0f} s")
+        for name, figure in sorted(figures.items()):
+            print(f"  {name}: {figure:,}")
+        print(f"  findings: {findings}", flush=True)
     return findings
 
 
@@ -309,26 +356,23 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--copies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, help="number of the first kill and copy")
     parser.add_argument("--nursery", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.nursery:
-        nursery()
+        with contextlib.suppress(KeyboardInterrupt):
+            nursery()
         return 0
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    findings = []
+    findings = 0
     for what, count in ((kills, args.kills), (copies, args.copies)):
-        if not count:
+        numbers = range(args.first, count)
+        if not numbers:
             continue
-        figures: Counter[str] = Counter()
-        began = time.perf_counter()
-        rng = random.Random(args.seed)  # noqa: S311 - no secret
-        found = what(count, rng, figures)
-        findings += found
-        print(f"{count:,} {what.__name__} in {time.perf_counter() - began:.0f} s")
-        for name, figure in sorted(figures.items()):
-            print(f"  {name}: {figure:,}")
-        print(f"  findings: {len(found)}", flush=True)
-    print("\n".join(findings))
+        try:
+            findings += look_at(what, numbers, args.seed)
+        except KeyboardInterrupt:
+            return INTERRUPTED
     return int(bool(findings))
 
 

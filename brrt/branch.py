@@ -217,6 +217,12 @@ def loop_planner(scenario: Scenario) -> LoopPlanner:
     return planner
 
 
+def plans_alike(before: Scenario, now: Scenario) -> bool:
+    """Whether two scenarios differ, but in nothing that planning knows of."""
+    same = before.settings() == now.settings() and before.make_stop() == now.make_stop()
+    return same and before != now
+
+
 def check_settled(before: LoopPlanner, now: LoopPlanner) -> None:
     """See that nothing is another that was settled when the run began.
 

@@ -12,6 +12,10 @@ class RecordingError(BrrtError):
     """A recording cannot be written, or cannot be read in whole."""
 
 
+class LogError(RecordingError):
+    """The events of a recording contradict each other, so that there is nothing to tell of it."""
+
+
 def unknown(what: str, name: str, known: Iterable[str]) -> BrrtError:
     """Return the error for `name`, which is none of the `known` names of a `what`."""
     names = sorted(known)

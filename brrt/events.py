@@ -13,6 +13,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+LATEST_NS = (1 << 62) - 1
+"""When a run may begin at the latest, in ns since 1970: in the year 2116."""
+
 Table = NDArray[np.void]
 """Events of one kind: a structured array with `seq`, `t`, `iteration` and the kind's fields."""
 

@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
 from brrt.errors import BrrtError
+from brrt.problem import Problem
 from brrt.robots import Robot, robot_from_json
 from brrt.scenario import Scenario
+from brrt.worlds.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,16 @@ class Branch:
         if min(known["iteration"], known["events"]) < 0:
             raise ValueError("a branch before the beginning")
         return cls(**known)
+
+
+def _scenario(text: str) -> Scenario:
+    """Read a scenario that names what was run: what is missing would be taken for the usual."""
+    values = json.loads(text)
+    scenario = Scenario.parse(values)
+    for name in ("world", "planner"):
+        if name not in values:
+            raise BrrtError(f"the manifest is damaged: its scenario has no {name}")
+    return scenario
 
 
 def _said(value: Any) -> str:
@@ -120,6 +132,15 @@ class Manifest:
         """
         return self.scenario.make_robot() if self.robot is None else robot_from_json(self.robot)
 
+    def make_problem(self, world: World) -> Problem:
+        """Put the recorded query and robot into the recorded world, even where files are gone.
+
+        Raises:
+            BrrtError: The query is of no use in the world, or the robot's definition is damaged.
+        """
+        query = replace(self.scenario, start=self.start, goal=self.goal)
+        return query.make_problem(world, self.make_robot())
+
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
         texts = {} if self.robot is None else {"robot": self.robot}
@@ -149,7 +170,7 @@ class Manifest:
             )
         try:
             return cls(
-                Scenario.parse(json.loads(texts["scenario"])),
+                _scenario(texts["scenario"]),
                 tuple(map(float, json.loads(texts["start"]))),
                 tuple(map(float, json.loads(texts["goal"]))),
                 int(texts["dim"]),
@@ -159,5 +180,7 @@ class Manifest:
                 texts.get("robot"),
                 tuple(map(Branch.parse, json.loads(texts.get("branches", "[]")))),
             )
-        except (KeyError, ValueError, TypeError, RecursionError) as error:
+        except KeyError as error:
+            raise BrrtError(f"the manifest is damaged: it has no {error}") from None
+        except (ValueError, TypeError, RecursionError) as error:
             raise BrrtError(f"the manifest is damaged: {error!r}") from None

@@ -18,6 +18,7 @@ from brrt.planners import PLANNERS
 from brrt.planners.stop import Stop
 from brrt.problem import Problem
 from brrt.replay.metrics import Metrics
+from brrt.replay.possible import check_possible
 from brrt.scenario import Scenario
 from brrt.settings import Settings
 from brrt.worlds.world import World
@@ -59,6 +60,8 @@ class Run:
         BrrtError: The scenario is of no use; nothing has been written anywhere.
     """
 
+    _stranger = False  # whose events are looked at, since somebody else's code emits them
+
     def __init__(
         self,
         scenario: Scenario,
@@ -71,6 +74,7 @@ class Run:
             scenario = replace(scenario, world=world.name)
         if planner is not None:
             scenario = _named(scenario, planner)
+            self._stranger = type(planner) not in PLANNERS.values()
         solver = scenario.make_planner() if planner is None else planner
         self._set_up(scenario, scenario.make_problem(world), solver, batch)
 
@@ -81,6 +85,7 @@ class Run:
         self._compile()
         self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
         self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
+        self._gone = False
         self.stop = scenario.make_stop()
         self.manifest = Manifest(
             scenario=scenario,
@@ -108,9 +113,20 @@ class Run:
                 pass
 
     def events(self) -> Iterator[Events]:
-        """Plan, smooth, drive; yield what happens, in batches."""
-        path, moved, iteration = None, False, 0
+        """Plan, smooth, drive; yield what happens, in batches.
+
+        Raises:
+            BrrtError: The run has gone already, or a planner of your own emits what no event can
+                say, as a phase of its own.
+        """
+        if self._gone:
+            raise BrrtError("a run goes once; make another brrt.Run(scenario) to run it again")
+        self._gone = True
+        path, moved, iteration, count = None, False, 0, 0
         for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):
+            count += len(batch)
+            if self._stranger:
+                check_possible(batch, count)
             path = _last_path(batch, path)
             moved = moved or Kind.MOVE in batch.counts
             # A planner may have gone on after its path; the count never falls.

@@ -84,8 +84,7 @@ class Scenario:
         for name in ("start", "goal"):
             if isinstance(getattr(self, name), str):
                 object.__setattr__(self, name, _configuration(name, getattr(self, name)))
-        if not names_robot_file(self.robot):
-            make_robot(self.robot)
+        object.__setattr__(self, "robot", _robot(self.robot))
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
         self._check_numbers()
@@ -231,6 +230,18 @@ class Scenario:
                 )
         assert start is not None and goal is not None  # noqa: S101, PT018 - told apart above
         return Problem(world, robot, start, goal)
+
+
+def _robot(spec: str) -> str:
+    """Return the name of a robot, so that a file's is known for one even when the file is gone.
+
+    Raises:
+        BrrtError: There is no such robot.
+    """
+    if not names_robot_file(spec):
+        make_robot(spec)
+        return spec
+    return spec if "/" in spec or spec.endswith(".json") else f"./{spec}"
 
 
 def _positive(value: Any) -> bool:

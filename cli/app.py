@@ -14,6 +14,7 @@ from .plan import plan
 from .plot import plot
 from .recover import recover
 from .replay import replay
+from .saved import naming_runs
 from .verify import verify
 from .view import view
 from .worlds import app as worlds
@@ -51,13 +52,13 @@ Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130
 )
 
 app.command()(plan)
-app.command()(replay)
-app.command()(plot)
+app.command()(naming_runs(replay))
+app.command()(naming_runs(plot))
 app.command()(verify)
 app.command()(diff)
-app.command()(explain)
-app.command()(export)
-app.command()(view)
+app.command()(naming_runs(explain))
+app.command()(naming_runs(export))
+app.command()(naming_runs(view))
 app.command()(recover)
 app.command()(planners)
 app.command()(robots)

@@ -1,13 +1,31 @@
 """The events of a recording, of one that was cut as far as they are whole."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from functools import wraps
+from typing import TYPE_CHECKING, Any
 
 from .console import counted, note
 
 if TYPE_CHECKING:
     from brrt.events import Events
     from brrt.recording import Recording
+
+
+def naming_runs(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a command name its file, and what to look with, where the events make no sense."""
+
+    @wraps(command)
+    def named(**given: Any) -> None:
+        from brrt.errors import BrrtError, LogError  # noqa: PLC0415 - keep --help fast
+
+        try:
+            command(**given)
+        except LogError as error:
+            runs = given["runs"] if "runs" in given else [given["run"]]
+            looked = " or ".join(map(str, runs))
+            raise BrrtError(f"{looked}: {error}; see brrt verify") from None
+
+    return named
 
 
 class Saved:

@@ -75,7 +75,7 @@ def verify(
     # A file that brrt recover made breaks off too, though it is whole.
     tallies = examine(
         recording.manifest, recording.world, saved,
-        cut=lambda: saved.cut or recording.result is None,
+        cut=lambda: saved.cut or recording.result is None, figures=recording.result,
     )  # fmt: skip
     cut, events = saved.cut or recording.result is None, saved.events
     broken = sum(tally.broken for tally in tallies)
@@ -93,6 +93,8 @@ def verify(
             }
         )
     else:
+        if cut and not saved.cut:
+            note(f"{run} breaks off; what is promised of a run's end was left out")
         if planner not in PLANNERS:
             note(f"planner {planner} is not known here; its special promises were not checked")
         _show(run, tallies, long=long)

@@ -85,7 +85,7 @@ def view(
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
     with tempfile.TemporaryDirectory(prefix="brrt-") as folder, _ending_in_order():
         with Watch(None, "drawing").running() as watch:
-            file, cursor = _prepare(runs, limits, Path(folder), watch, partial=partial)
+            file, cursor, *marks = _prepare(runs, limits, Path(folder), watch, partial=partial)
         if web:
             _serve(file, runs, port)
             return
@@ -93,9 +93,9 @@ def view(
 
         with Watch(None, "waiting for the viewer").running():
             if screenshot is None:
-                drive.show(file, cursor)
+                drive.show(file, cursor, *marks)
             else:
-                drive.screenshot(file, screenshot, cursor, pixels)
+                drive.screenshot(file, screenshot, cursor, pixels, *marks)
         if screenshot is not None:
             out.print(f"{screenshot}: written", markup=False, soft_wrap=True)
 
@@ -144,8 +144,11 @@ def _check(
 
 def _prepare(
     runs: list[Path], limits: dict[str, int], folder: Path, watch: Watch, *, partial: bool
-) -> "tuple[Path, Cursor | None]":
-    """Return an .rrd file of the runs, drawn into the folder where needed, and where to open it."""
+) -> "tuple[Path, Cursor | None, *tuple[Path, ...]]":
+    """Return an .rrd file of the runs, drawn into the folder where needed, and where to open it.
+
+    Behind them come files with more to show.
+    """
     from brrt.recording import read  # noqa: PLC0415 - keep --help fast
 
     recordings = [read(run) for run in runs]
@@ -163,11 +166,26 @@ def _prepare(
     cursor = cursors[0] if cursors else None
     if len(runs) == 2:
         return _prepare_pair(runs, recordings, logs, folder, watch, cursor)
+    marks = _marks(recordings[0], logs[0], limits, folder)
     if runs[0].suffix == ".rrd" and not cut:
-        return runs[0], cursor
+        return runs[0], cursor, *marks
     file = folder / f"{runs[0].stem}.rrd"
     _draw(recordings[0], logs[0], file, watch)
-    return file, cursor
+    return file, cursor, *marks
+
+
+def _marks(
+    recording: "Recording", log: "list[Events]", limits: dict[str, int], folder: Path
+) -> list[Path]:
+    """Draw a ring around the place of the event that is asked for, if one is."""
+    from brrt.events import Events  # noqa: PLC0415
+    from brrt.recording.mark import draw_mark  # noqa: PLC0415
+
+    if "seq" not in limits:
+        return []
+    mark, events = folder / "mark.rrd", Events.concat(recording.manifest.dof, log)
+    draw_mark(mark, recording.manifest, recording.world, events, limits["seq"])
+    return [mark]
 
 
 def _check_instant(limits: dict[str, int], logs: "list[list[Events]]") -> None:

@@ -283,3 +283,37 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
         assert refused.code == 2
         assert message in refused.err
         assert refused.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("planner", "iterations", "params"),
+    [
+        ("rrt", 5000, {}),
+        ("rrt-star", 300, {}),
+        ("bi-rrt-star", 300, {"stop_at_first": True}),
+        ("a-star", 9000, {"epsilon": 2.0}),
+        ("lrta-star", 9000, {"epsilon": 2.0, "trials": 2}),
+    ],
+)
+def test_what_follows_planning_is_made_anew(
+    planner: str, iterations: int, params: dict[str, Any]
+) -> None:
+    """Planning ends once more as it did; then the smoother has its own attempts."""
+    scenario = Scenario(
+        world="circles2d:n=20,seed=3", planner=planner, params=params, iterations=iterations
+    )
+    recording, _ = parent(scenario)
+    run, events = child(recording, settings={"shortcuts": 7})
+    assert first_difference([parent(replace(scenario, shortcuts=7))[1]], [events]) is None
+    assert len(events[Kind.SHORTCUT]) == 7
+    assert check(run.manifest, recording.world, events) == []
+    with pytest.raises(BrrtError, match=r"ended with its path|give more by --iterations"):
+        BranchedRun(recording)
+
+
+def test_a_run_goes_once() -> None:
+    """Its generator and its log have gone on, so a second time it would be another run."""
+    run = Run(plain("circles2d:n=20,seed=3", iterations=50))
+    run.execute([])
+    with pytest.raises(BrrtError, match=r"goes once; make another brrt\.Run\(scenario\)"):
+        run.execute([])

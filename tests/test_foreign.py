@@ -1,5 +1,6 @@
 """Somebody else's planner: it runs, is recorded, read, drawn and checked without its class."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -168,3 +169,63 @@ def test_replay_prints_the_trees_as_rewired(brrt: Callable[..., Result], tmp_pat
     done = brrt("replay", "star.mcap")
     assert done.out.split()[-1] == f"{tree.cost.max():.6g}"
     assert done.out.split()[-3:-1] == [f"{tree.leaves:,}", f"{tree.depth:,}"]
+
+
+class Babble:
+    """Begins well and then says what no event can say.
+
+    Args:
+        kind: Of what it says last.
+        fields: Its fields.
+    """
+
+    def __init__(self, kind: Kind, **fields: Any) -> None:
+        self._kind, self._fields = kind, fields
+
+    def solve(self, problem: Any, rng: Any, log: EventLog, stop: Any) -> Any:
+        """Emit two batches."""
+        log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
+        log.emit(Kind.EDGE, 0, tree=0, node=0, parent=-1, cost=0.0, q=problem.start)
+        yield log.drain()
+        log.emit(self._kind, 1, **self._fields)
+        yield log.drain()
+
+
+@pytest.mark.parametrize(
+    ("planner", "message"),
+    [
+        (Babble(Kind.PHASE, name=7, status=0), "phase has name = 7; there is 0 (plan), 1 (smooth)"),
+        (Babble(Kind.PHASE, name=0, status=99), "phase has status = 99; there is 0 (begin)"),
+        (Babble(Kind.SAMPLE, tree=0, source=9, q=[1, 1]), "sample has source = 9; there is 0 (uni"),
+        (Babble(Kind.SAMPLE, tree=0, source=0, q=[1, np.nan]), "sample has q = [ 1. nan]"),
+        (Babble(Kind.PATH, stage=5, cost=1.0, waypoints=[[1, 1]]), "path has stage = 5; there is"),
+    ],
+    ids=str,
+)
+def test_what_no_event_can_say(planner: Babble, message: str, tmp_path: Path) -> None:
+    """It is an error at once, whatever the sink; what was said before it can be read."""
+    run = Run(replace(FOREIGN, smooth=False), planner=Babble(Kind.PHASE, name=0, status=5))
+    run._planner = planner  # a run compiles by trying the planner
+    paths, world = [tmp_path / "x.mcap", tmp_path / "x.rrd"], run.problem.world
+    memory = Memory()
+    sinks: list[Any] = [
+        memory, McapSink(paths[0], run.manifest, world),
+        RerunSink(run.manifest, world, path=paths[1]),
+    ]  # fmt: skip
+    with pytest.raises(BrrtError, match=re.escape(f"event 2: {message}")):
+        run.execute(sinks)
+    assert len(memory.events()) == 2
+    for path in paths:
+        assert len(read(path).events()) == 2
+
+
+def test_sinks_alone_refuse_a_phase_that_there_is_not(tmp_path: Path) -> None:
+    """The file counts the phases itself, also where no run does."""
+    run = Run(FOREIGN, planner=TOYS["star"])
+    table = np.zeros(1, table_dtype(Kind.PHASE, 2))
+    table["name"] = 7
+    sink = McapSink(tmp_path / "x.mcap", run.manifest, run.problem.world)
+    sink.write(Events(2, {Kind.PHASE: table}))
+    with pytest.raises(BrrtError, match=r"event 0: 7 is not a valid Phase; a phase is one of"):
+        sink.close(whole=False)
+    assert read(tmp_path / "x.mcap").manifest == run.manifest

@@ -1,5 +1,6 @@
 """Recordings that were made to do harm: refused in one line, soon, and with little memory."""
 
+import os
 import struct
 import tracemalloc
 from collections.abc import Callable
@@ -14,12 +15,14 @@ from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from brrt import Events, McapSink, RecordingError, Scenario, first_difference, read
+from brrt import Events, Kind, McapSink, RecordingError, Scenario, first_difference, read
+from brrt.recording.container import MAGIC
+from brrt.recording.mcap_records import SEAL
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import FRAME
 from brrt.recording.rrd_outline import Outline
 
-from .conftest import recorded
+from .conftest import Result, recorded
 
 SCENARIO = Scenario(world="circles2d:n=9", seed=1, clock="logical", iterations=60)
 pa: Any = pyarrow  # mypy knows none of its names
@@ -27,15 +30,15 @@ NAME = "brrt.phase:name"
 LITTLE = 64 << 20
 
 
-def write(path: Path) -> Events:
-    """Record a run; return its log."""
+def write(path: Path, events: Events | None = None) -> Events:
+    """Record a run, or other events in its name; return its log."""
     run, log = recorded(SCENARIO)
     sink: Any
     if path.suffix == ".rrd":
         sink = RerunSink(run.manifest, run.problem.world, path=path)
     else:
         sink = McapSink(path, run.manifest, run.problem.world)
-    sink.write(log)
+    sink.write(log if events is None else events)
     sink.close(whole=True)
     return log
 
@@ -72,6 +75,7 @@ class Forger:
         with path.with_name("true.mcap").open("rb") as file:
             reader = make_reader(file)
             (self.run,) = [m.metadata for m in reader.iter_metadata() if m.name == "brrt.run"]
+            del self.run[SEAL]  # who forges a manifest can forge that, too
             (world,) = reader.iter_attachments()
             self.world = world.data
             found: list[tuple[Any, Any, Any]] = list(reader.iter_messages())
@@ -172,6 +176,7 @@ MANIFESTS: dict[str, tuple[dict[str, str], str]] = {
     "other dof": ({"dof": "3"}, "start has 2 numbers, and not 3"),
     "other dim": ({"dim": "3"}, "its world is 2D, and not 3D"),
     "epoch": ({"epoch_ns": "9" * 40}, "ns after 1970"),
+    "no planner": ({"scenario": '{"world": "w"}'}, "its scenario has no planner"),
     "no epoch": ({"epoch_ns": "1e9"}, "the manifest is damaged"),
     "long number": ({"dof": "9" * 5000}, "the manifest is damaged"),
     "recursion": ({"scenario": "[" * 200_000}, "the manifest is damaged"),
@@ -233,6 +238,73 @@ def frames_of(data: bytes) -> list[tuple[int, int, int]]:
         found.append((opcode, at, length + 9))
         at += length + 9
     return found
+
+
+@pytest.mark.parametrize("what", ["brrt.run", "world.json", "brrt.result"])
+def test_head_and_figures_have_checksums_of_their_own(what: str, tmp_path: Path) -> None:
+    """A letter of the manifest, the world or the figures is another: seen before any event is."""
+    path = tmp_path / "x.mcap"
+    write(path)
+    data, texts = bytearray(path.read_bytes()), {"brrt.run": b'"seed": 1', "world.json": b"circ"}
+    text = texts.get(what, b'"iteration limit"')
+    at = data.index(text, data.index(what.encode()))
+    data[at + len(text) - 2] ^= 1
+    path.write_bytes(data)
+    if what == "brrt.result":
+        assert read(path).result is None
+        assert "checksum of brrt.result does not match" in told(path)
+    else:
+        with pytest.raises(RecordingError, match=f"the checksum of {what} does not match"):
+            read(path)
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".rrd"])
+def test_events_that_contradict_each_other(
+    ending: str, brrt: Callable[..., Result], tmp_path: Path
+) -> None:
+    """Of a log that makes no tree nothing is told but that, with the name of its file."""
+    log, path = write(tmp_path / f"bad{ending}"), f"bad{ending}"
+    for name, value in (("parent", 50), ("parent", 5), ("node", 7), ("iteration", 1 << 59)):
+        edges = log[Kind.EDGE].copy()
+        edges[name][5] = value
+        write(tmp_path / path, Events(log.dof, {**log.tables, Kind.EDGE: edges}))
+        for command in (
+            ("replay", path), ("replay", path, "--node", "5"), ("explain", path),
+            ("plot", path, "--out", "x.png", "--dpi", "40"),
+            ("export", path, "--foxglove", "x.mcap", "--force"),
+        ):  # fmt: skip
+            done = brrt(*command)
+            if done.code == 0:
+                assert done.out
+                assert name == "iteration" or command[0] in ("explain", "export"), command
+                continue
+            assert (done.code, done.out, done.err.count("\n")) == (2, "", 1), (command, done.err)
+            assert done.err.startswith(f"brrt: {path}: ")
+            assert done.err.endswith("; see brrt verify\n")
+        assert brrt("verify", path).code == 1
+        Path("x.png").unlink(missing_ok=True)
+
+
+def test_what_is_no_file(brrt: Callable[..., Result], tmp_path: Path) -> None:
+    """Folders, pipes, devices, loops of links, and nothing at all: one line, at once."""
+    Path("folder").mkdir()
+    os.mkfifo("pipe")
+    Path("loop").symlink_to("loop")
+    Path("zeros").symlink_to("/dev/zero")
+    Path("empty").touch()
+    Path("latin").write_bytes(b"\xff\xfe\x00")
+    Path("short").write_bytes(MAGIC)
+    Path("blank").write_bytes(MAGIC + bytes(10_000_000))
+    Path("barren").write_bytes(MAGIC + (b"\x90" + bytes(8)) * 200_000)
+    for name in "folder pipe loop zeros empty latin short blank barren missing".split():
+        for command in (
+            ("replay", name),
+            ("recover", name, "--out", "x.mcap"),
+            ("diff", name, "x"),
+        ):
+            done = brrt(*command)
+            assert (done.code, done.out, done.err.count("\n")) == (2, "", 1), command
+            assert done.err.startswith(f"brrt: {name}: ")
 
 
 def varint(value: int) -> bytes:

@@ -173,6 +173,9 @@ def test_file_of_another_program(brrt_golden, tmp_path):
     [
         ('brrt_golden("../up", brrt.Scenario())', "name '../up': give letters"),
         ('brrt_golden("x")', "no golden run golden/x.mcap; give brrt_golden the run as well"),
+        ("brrt_golden(brrt.Scenario())", "give the name of the golden file first, and not Scen"),
+        ("brrt_gate(brrt.Scenario(), cost=0.1)", "say what to hold it against: the name of a"),
+        ('brrt_gate(lambda: 0, against="x", cost=0.1)', "give a scenario or a function of the"),
         ('brrt_golden("x", 7)', "give a Scenario, a Run, a Recording or a file"),
         ('brrt_golden("x", brrt.Scenario(time=1.0))', "a budget of time ends each run elsewhere"),
         ('brrt_golden("x", "none.mcap")', "none.mcap: No such file or directory"),
@@ -219,6 +222,10 @@ def test_gate_made_held_changed_and_renewed(pytester: pytest.Pytester, run: Pyte
     failed = run("--brrt-failed=failed")
     assert failed.ret == 1
     assert "golden/figures.json: FAILED, 12 seeds" in text(failed)
+    assert any(
+        line.startswith("  brrt plan ") and "--param step=1 --out seed" in line
+        for line in failed.outlines
+    )
     assert any(line.startswith("  iterations") and "FAIL" in line for line in failed.outlines)
     assert (pytester.path / "failed" / "golden" / "figures.txt").read_text().rstrip() in text(
         failed
@@ -270,14 +277,18 @@ def test_tolerance(pytester: pytest.Pytester, run: Pytest) -> None:
         recording.manifest, recording.world, lambda: iter([events]), recording.result
     )
     golden.save(doctored, kept)
-    assert run().ret == 1
+    differs = run()
+    assert differs.ret == 1
+    assert "Only the rounding differs: tolerance=1e-09 lets that pass." in text(differs)
     for tolerance, code in ((1e-10, 0), (1e-13, 1)):
         file.write_text(ONE.replace("seed=7)", f"seed=7), tolerance={tolerance}"))
         assert run().ret == code
     events[brrt.Kind.EDGE]["parent"][-1] += 1
     golden.save(doctored, kept)
     file.write_text(ONE.replace("seed=7)", "seed=7), tolerance=1.0"))
-    assert "parent" in text(run())
+    differs = run()
+    assert "parent" in text(differs)
+    assert "Only the rounding" not in text(differs)
 
 
 STAND_IN = """

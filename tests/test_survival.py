@@ -22,6 +22,7 @@ from brrt.recording.output import Output
 from brrt.recording.recover import NOTE, recover
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import BATCH, FRAME, HEAD, unpacked
+from brrt.recording.rrd_outline import Outline
 from brrt.recording.stamp import BLANK, WRITTEN
 
 from .conftest import Result, recorded
@@ -308,6 +309,68 @@ def test_recover_says_what_it_did(brrt: Command, tmp_path: Path) -> None:
         assert message in done.err
     assert not Path("d.mcap").exists()
     assert "save them with brrt recover" in brrt("replay", "cut.mcap").err
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_a_cut_leaves_is_never_called_broken(
+    ending: str, brrt: Command, tmp_path: Path
+) -> None:
+    """Ahead of the first event, behind a batch and behind the last one: recovered, it verifies."""
+    path = tmp_path / f"run{ending}"
+    log, found = write(path), set()
+    data, first = path.read_bytes(), first_event(path)
+    cut, whole = tmp_path / f"cut{ending}", tmp_path / f"whole{ending}"
+    for size in (first + 30, (first + len(data)) // 2, len(data) - 9):
+        cut.write_bytes(data[:size])
+        assert brrt("recover", cut.name, "--out", whole.name, "--force").code == 0
+        for name, options in ((whole.name, []), (cut.name, ["--partial"])):
+            done = brrt("verify", name, "--json", *options)
+            assert (done.code, done.json["holds"]) == (0, True), done.out
+            assert done.json["events"] == brrt("replay", name, "--json", *options).json["events"]
+        found.add(done.json["events"])
+    assert len(found) == 3
+    assert {0, len(log)} <= found
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_power_cut_that_leaves_zeros(ending: str, brrt: Command, tmp_path: Path) -> None:
+    """A file may have its length and not its content: what follows the last batch is a cut."""
+    path = tmp_path / f"run{ending}"
+    run, log = recorded(SCENARIO, batch=100)
+    sink = new_sink(path, run)
+    sink.write(part(log, 0, 300))
+    data = path.read_bytes()
+    sink.close(whole=False)
+    for size in (1 << 12, 1 << 24):
+        for keep in (len(data), len(data) - 20):
+            path.write_bytes(data[:keep] + bytes(size))
+            found = recover(path, tmp_path / "whole.mcap")
+            assert found.lost is not None
+            assert begins(log, read(tmp_path / "whole.mcap").events())
+            if keep == len(data):
+                assert found.events == 300
+                done = brrt("replay", path.name, "--partial", "--json")
+                assert (done.code, done.json["events"]) == (0, 300)
+
+
+def first_event(path: Path) -> int:
+    """Return the byte near which a file's events begin."""
+    if path.suffix == ".rrd":
+        return Outline.of(path).places[0][1]
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    return summary.chunk_indexes[0].chunk_start_offset
+
+
+def test_events_of_an_rrd_are_sound_ahead_of_their_picture(tmp_path: Path) -> None:
+    """A checksum stands right behind a batch's events: what is drawn of them may be cut off."""
+    path = tmp_path / "run.rrd"
+    log = write(path, batch=10**6)
+    data, (_, at, length) = path.read_bytes(), Outline.of(path).places[-1]
+    check = at + length
+    path.write_bytes(data[: check + FRAME.size + FRAME.unpack_from(data, check)[1]])
+    assert len(saved(path)[0]) == len(log)
 
 
 def test_recover_to_a_disk_that_is_full(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from rerun.experimental import ViewerClient
 from brrt import Events, Kind, McapSink, Run, Scenario, forest, read
 from brrt.colours import GOAL, OBSTACLE, START
 from brrt.errors import RecordingError
-from brrt.recording import drive, pair, scene
+from brrt.recording import drive, mark, pair, scene
 from brrt.recording import viewer as viewer_program
 from brrt.recording.drive import Cursor
 from brrt.recording.rerun import RerunSink
@@ -250,7 +250,7 @@ def test_two_runs_below_entities_of_their_own(tmp_path: Path) -> None:
         alone = {name for name in entities(drawn(path, tmp_path)) if name.startswith("/world")}
         mine = {name.removeprefix(f"/{letter}") for name in found if name.startswith(f"/{letter}/")}
         assert {n for n in mine if "difference" not in n and n.startswith("/world")} == alone
-        assert {"/world/difference", "/world/difference/label", "/run", "/log"} <= mine
+        assert {"/world/mark", "/world/mark/label", "/run", "/log"} <= mine
     rest = {name for name in found if not name.startswith(("/A", "/B", "/__properties"))}
     assert rest == {"/difference"}
     for chunk in RrdReader(tmp_path / "pair.rrd").stream():
@@ -284,11 +284,35 @@ def test_every_kind_of_event_has_a_place(tmp_path: Path) -> None:
         for kind, table in side.events.tables.items():
             met.add(kind)
             for row in table[[0, len(table) // 2, -1]]:
-                place = pair._place(side, int(row["seq"]), None)
+                place = mark.place_of(side.events, side.manifest, int(row["seq"]))
                 assert place.shape == (dof,)
                 if "q" in (table.dtype.names or ()):
                     assert (place == row["q"]).all()
     assert {Kind.REWIRE, Kind.CONNECT, Kind.PATH, Kind.SHORTCUT, Kind.HEURISTIC} <= met
+
+
+def assert_ringed(picture: NDArray[np.int64], where: Frame, q: Any) -> None:
+    """A ring stands around a place."""
+    at = np.argwhere(of_colour(picture, mark.MARK))
+    row, column = where.pixels(np.asarray(q)[None])[0]
+    reach = 0.02 * (where.right - where.left)
+    far = np.hypot(at[:, 0] - row, at[:, 1] - column)
+    on_ring = np.abs(far - reach) < 3
+    assert on_ring.sum() > 2 * np.pi * reach  # all around; the rest is the label below it
+    assert (at[~on_ring][:, 0] > row + reach).all()
+
+
+@pytest.mark.usefixtures("viewer")
+@pytest.mark.parametrize("ending", ["mcap", "rrd"])
+def test_an_event_is_ringed(brrt: Callable[..., Result], tmp_path: Path, ending: str) -> None:
+    """Who is sent to an event finds it, in a file that is drawn and in one that is there."""
+    recording, run = read(GOLDEN), GOLDEN if ending == "mcap" else drawn(GOLDEN, tmp_path)
+    edge = recording.events()[Kind.EDGE][40]
+    at = ("--at-event", int(edge["seq"]))
+    result = brrt("view", run, "--screenshot", "x.png", "--size", "1400x900", *at)
+    assert result.code == 0, result.err
+    picture = opened((tmp_path / "x.png").read_bytes())[:, :950]
+    assert_ringed(picture, frame(picture, recording.world), edge["q"])
 
 
 @pytest.mark.usefixtures("viewer")
@@ -303,14 +327,7 @@ def test_two_runs_show_where_they_part(brrt: Callable[..., Result], tmp_path: Pa
         half = picture[:, 700 * number :][:, :700]
         sample = read(path).events()[Kind.SAMPLE][0]
         assert sample["seq"] == 2
-        where = frame(half[:620], read(path).world)
-        at = np.argwhere(of_colour(half, pair.MARK))
-        row, column = where.pixels(sample["q"][None])[0]
-        reach = 0.02 * (where.right - where.left)
-        far = np.hypot(at[:, 0] - row, at[:, 1] - column)
-        on_ring = np.abs(far - reach) < 3
-        assert on_ring.sum() > 2 * np.pi * reach  # all around; the rest is the label below it
-        assert (at[~on_ring][:, 0] > row + reach).all()
+        assert_ringed(half, frame(half[:620], read(path).world), sample["q"])
 
 
 # --- the browser --------------------------------------------------------------------------------

@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, unknown
-from brrt.events import FIELDS, Events, Instant, Kind, LazyTables, Phase, Table, table_dtype
+from brrt.events import (
+    FIELDS,
+    LATEST_NS,
+    Events,
+    Instant,
+    Kind,
+    LazyTables,
+    Phase,
+    Table,
+    table_dtype,
+)
 from brrt.kernels.clock import COMPILED_CLOCK, now_ns
 from brrt.kernels.jit import inlined
 
@@ -205,7 +215,8 @@ class EventLog:
         )
         self.buffer.state[_LAST_T] = -1
         self.buffer.state[_TICK] = 1000 if logical_clock else 0
-        self.epoch_ns = 0 if logical_clock else time.time_ns()
+        # A clock that was never set may stand before 1970, or in another age: files hold neither.
+        self.epoch_ns = 0 if logical_clock else min(max(time.time_ns(), 0), LATEST_NS)
         self._origin = time.perf_counter_ns()
         self._drained = time.monotonic()
         self.buffer.state[_ORIGIN] = self._origin if COMPILED_CLOCK else 0

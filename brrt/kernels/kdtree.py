@@ -85,9 +85,15 @@ def rooted_kdtree(roots: Floats, capacity: int) -> KdTree:
 def grown_kdtree(tree: KdTree, capacity: int) -> KdTree:
     """Return the same tree with room for `capacity` nodes."""
     larger = _empty_kdtree(tree.points.shape[1], capacity)
-    arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(larger, tree, strict=True))
-    for new, old in arrays:
-        new[: len(old)] = old
+    cells, buckets = int(tree.counts[_CELLS]), int(tree.counts[_BUCKETS])
+    # Only what is in use: whatever is written takes memory.
+    used = dict.fromkeys(("cells", "boxes", "built"), cells)
+    used |= dict.fromkeys(("points", "nodes"), BUCKET * buckets)
+    used["counts"] = len(tree.counts)
+    used["free_cells"] = int(tree.counts[_FREE_CELLS])
+    used["free_buckets"] = int(tree.counts[_FREE_BUCKETS])
+    for name, n in used.items():
+        getattr(larger, name)[:n] = getattr(tree, name)[:n]
     return larger
 
 

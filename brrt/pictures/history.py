@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.errors import RecordingError
+from brrt.errors import LogError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status
 from brrt.manifest import Manifest
 from brrt.replay.forest import forest
@@ -69,7 +69,7 @@ class History:
         record: The run.
 
     Raises:
-        RecordingError: The events do not make trees.
+        LogError: The events do not make trees.
     """
 
     def __init__(self, record: Record) -> None:
@@ -215,7 +215,7 @@ def _check_parents(made: Changes, nodes: int) -> None:
     wrong = np.flatnonzero((made.parent >= nodes) | (made.parent == made.node))
     if len(wrong):
         i = int(wrong[0])
-        raise RecordingError(
+        raise LogError(
             f"event {made.seq[i]}: node {made.node[i]} gets parent {made.parent[i]}, "
-            "which is not there; see brrt verify"
+            "which is not there"
         )

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from brrt.errors import RecordingError
+from brrt.files import is_there
 from brrt.recording.container import MAGIC
 from brrt.recording.mcap_reader import read_mcap
 from brrt.recording.mcap_writer import McapSink
@@ -22,6 +23,8 @@ def read(path: Path | str) -> Recording:
     """
     path = Path(path)
     try:
+        if not (path.is_file() or path.is_dir()) and is_there(path):
+            raise RecordingError(f"{path}: no file but a pipe or a device; save it to a file first")
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))
     except OSError as error:

@@ -16,6 +16,8 @@ _IDLE_S = 0.1
 class Background:
     """Hands batches to another sink on a thread; kernels run without the GIL meanwhile.
 
+    While no batch comes, the sink is asked all the same whether it is time to write what it holds.
+
     What the sink raises is raised again by the next call here.
 
     Args:

@@ -25,7 +25,7 @@ class Cursor(NamedTuple):
     value: int
 
 
-def show(run: Path, cursor: Cursor | None) -> None:
+def show(run: Path, cursor: Cursor | None, *marks: Path) -> None:
     """Open a recording in a window of its own; the window outlives us.
 
     One that is open goes on showing what somebody looks at.
@@ -35,6 +35,7 @@ def show(run: Path, cursor: Cursor | None) -> None:
     Args:
         run: An .rrd file.
         cursor: Where to open it; None leaves that to the recording.
+        marks: Files of the same recording with more to show.
 
     Raises:
         RecordingError: There is no viewer, or it does not take the recording.
@@ -43,7 +44,7 @@ def show(run: Path, cursor: Cursor | None) -> None:
     program = Program(f"--port={port}", "--hide-welcome-screen")
     try:
         with telling("open the recording", program):
-            _load(connect(port, program), run, cursor)
+            _load(connect(port, program), run, cursor, *marks)
         program.leave()
     except BaseException:
         program.stop()
@@ -51,7 +52,11 @@ def show(run: Path, cursor: Cursor | None) -> None:
 
 
 def screenshot(
-    run: Path, picture: Path, cursor: Cursor | None = None, size: tuple[int, int] = (1600, 1000)
+    run: Path,
+    picture: Path,
+    cursor: Cursor | None = None,
+    size: tuple[int, int] = (1600, 1000),
+    *marks: Path,
 ) -> None:
     """Write a picture of a recording in the viewer as a PNG; no screen is needed.
 
@@ -60,11 +65,13 @@ def screenshot(
         picture: The file to write.
         cursor: Which instant; None leaves that to the recording.
         size: Width and height in pixels.
+        marks: Files of the same recording with more to show.
 
     Raises:
         RecordingError: The viewer cannot run here, or does not come to rest.
     """
     with headless(size) as client:
+        _load(client, run, cursor, *marks)
         png = shoot(client, run, cursor)
     try:
         picture.write_bytes(png)
@@ -116,13 +123,15 @@ def shoot(client: ViewerClient, run: Path, cursor: Cursor | None, view: str | No
     raise RecordingError(f"{run}: its picture does not come to rest within {STILL_S:.0f} s")
 
 
-def _load(client: ViewerClient, run: Path, cursor: Cursor | None) -> None:
+def _load(client: ViewerClient, run: Path, cursor: Cursor | None, *marks: Path) -> None:
     """Open a recording, wait for all of it, and go to an instant."""
     stores = client.open(str(run.resolve())).store_ids
     if not stores:
         said = [entry.message for entry in client.get_logs() if entry.level == "ERROR"]
         reason = said[-1].splitlines()[0] if said else "it does not say why"
         raise RecordingError(f"{run}: the Rerun viewer does not take it: {reason}")
+    for mark in marks:
+        client.open(str(mark.resolve()))
     begin = time.monotonic()
     while time.monotonic() < begin + LOAD_S:
         state = client.get_state()

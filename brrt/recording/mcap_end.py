@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 from brrt.errors import RecordingError
 from brrt.events import Kind
 from brrt.recording.container import MAGIC
-from brrt.recording.mcap_records import FOOTER, check_summary, parsed, records_of
+from brrt.recording.mcap_records import FOOTER, check_summary, metadata_of, parsed, records_of
 from brrt.recording.mcap_writer import RESULT
 from brrt.recording.sound import MOST_BYTES
 
@@ -45,7 +45,7 @@ def ending(path: Path) -> tuple[Result | None, Counts | None]:
                     index = parsed(path, records.MetadataIndex, data)
                     if index.name == RESULT and index.length <= MOST_BYTES:
                         file.seek(index.offset)
-                        result = figures_of(path, file.read(index.length)[9:])
+                        result = figures_of(path, metadata_of(path, file.read(index.length)[9:]))
         except (OSError, OverflowError, RecordingError):
             return None, None
     return result, counts
@@ -66,14 +66,13 @@ def _summary(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
             yield opcode, data
 
 
-def figures_of(path: Path, data: bytes) -> Result:
-    """Read the figures from their record.
+def figures_of(path: Path, metadata: records.Metadata) -> Result:
+    """Read the figures from their texts.
 
     Raises:
         RecordingError: It is damaged.
     """
-    texts = parsed(path, records.Metadata, data).metadata
     try:
-        return {name: json.loads(text) for name, text in texts.items()}
+        return {name: json.loads(text) for name, text in metadata.metadata.items()}
     except (ValueError, RecursionError):
         raise RecordingError(f"{path}: damaged: the figures are not JSON") from None

@@ -19,7 +19,7 @@ from brrt.events import FIELDS, Events, Kind, table_dtype
 from brrt.manifest import Manifest
 from brrt.recording.cdr import MESSAGE, RECORD_HEAD, Layout
 from brrt.recording.mcap_end import LABELS, ending, figures_of
-from brrt.recording.mcap_records import opened, parsed, records_of
+from brrt.recording.mcap_records import attachment_of, metadata_of, opened, parsed, records_of
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
 from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head
@@ -49,10 +49,10 @@ def read_mcap(path: Path) -> Recording:
     with opened(path) as file:
         for opcode, data in _head_of(path, file):
             if opcode == Opcode.METADATA:
-                metadata = parsed(path, records.Metadata, data)
+                metadata = metadata_of(path, data)
                 texts = metadata.metadata if metadata.name == RUN else texts
             elif opcode == Opcode.ATTACHMENT and texts is not None:
-                attachment = parsed(path, records.Attachment, data)
+                attachment = attachment_of(path, data)
                 if attachment.name == WORLD:
                     manifest, world = head(path, texts, attachment.data)
                     batches = partial(_batches, path, manifest)
@@ -89,9 +89,9 @@ class _Decoder:
     channels: dict[int, _Channel] = field(default_factory=dict)
 
     def damaged(self, why: str) -> RecordingError:
-        return RecordingError(
-            f"{self.path}: damaged after event {self.numbering.next - 1:,}: {why}"
-        )
+        last = self.numbering.next - 1
+        place = "ahead of the first event" if last < 0 else f"after event {last:,}"
+        return RecordingError(f"{self.path}: damaged {place}: {why}")
 
     def index(self, data: bytes) -> tuple[int, NDArray[np.uint64]]:
         """Read where a channel's messages are in the chunk ahead."""
@@ -274,8 +274,8 @@ def _batches(path: Path, manifest: Manifest) -> Iterator[Events]:
                 elif opcode == Opcode.MESSAGE:
                     raise decoder.damaged("a message outside of a chunk, as brrt writes none")
                 elif opcode == Opcode.METADATA:
-                    metadata = parsed(path, records.Metadata, data)
-                    figures = figures_of(path, data) if metadata.name == RESULT else figures
+                    metadata = metadata_of(path, data)
+                    figures = figures_of(path, metadata) if metadata.name == RESULT else figures
         except CutError as error:
             if chunk is not None:
                 yield decoder.events(chunk, index)

@@ -1,8 +1,9 @@
 """What an MCAP file is made of: records, read from the front into bounded memory."""
 
+import json
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
@@ -16,6 +17,10 @@ from brrt.recording.container import MAGIC
 from brrt.recording.sound import MOST_BYTES, CutError
 
 _BLOCK = 1 << 20
+_MOST_BARREN = 1 << 17
+"""Records between two chunks: there are 65,536 channels, and each may have an index."""
+SEAL = "crc32"
+"""Name of the text that is the checksum of the others."""
 FOOTER = 29
 """Bytes of the footer's record."""
 
@@ -49,6 +54,41 @@ def parsed(path: Path, kind: Any, data: bytes) -> Any:
         raise RecordingError(f"{path}: damaged {kind.__name__}: {error}") from None
 
 
+def sealed(texts: Mapping[str, str]) -> dict[str, str]:
+    """Add a checksum to named texts: of Metadata, MCAP has none but that of all the data."""
+    return {**texts, SEAL: _seal(texts)}
+
+
+def metadata_of(path: Path, data: bytes) -> records.Metadata:
+    """Read named texts from their record; their checksum, if they have one, is seen to and gone.
+
+    Raises:
+        RecordingError: They are damaged.
+    """
+    metadata: records.Metadata = parsed(path, records.Metadata, data)
+    stated = metadata.metadata.pop(SEAL, None)
+    if stated is not None and stated != _seal(metadata.metadata):
+        raise RecordingError(f"{path}: damaged: the checksum of {metadata.name} does not match")
+    return metadata
+
+
+def _seal(texts: Mapping[str, str]) -> str:
+    return str(zlib.crc32(json.dumps(sorted(texts.items())).encode()))
+
+
+def attachment_of(path: Path, data: bytes) -> records.Attachment:
+    """Read an attachment from its record.
+
+    Raises:
+        RecordingError: It is damaged.
+    """
+    attachment: records.Attachment = parsed(path, records.Attachment, data)
+    stated = struct.unpack("<I", data[-4:])[0]
+    if stated and stated != zlib.crc32(data[:-4]):  # 0 is for none
+        raise RecordingError(f"{path}: damaged: the checksum of {attachment.name} does not match")
+    return attachment
+
+
 def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tuple[int, bytes]]:
     """Yield opcode and content of each record of the data section, DataEnd included.
 
@@ -61,12 +101,19 @@ def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tupl
         CutError: The file ends before that.
         RecordingError: It is damaged.
     """
-    crc = zlib.crc32(MAGIC)
+    crc, barren = zlib.crc32(MAGIC), 0
     while True:
         head = file.read(9)
         if len(head) < 9:
             raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
         opcode, length = struct.unpack("<BQ", head)
+        if not any(head):  # a disk that lost its power may fill up what it did not write
+            raise CutError(f"{path}: the file is cut at byte {file.tell() - 9:,}: zeros follow")
+        barren = 0 if opcode == Opcode.CHUNK else barren + 1
+        if barren > _MOST_BARREN:
+            raise RecordingError(
+                f"{path}: damaged near byte {file.tell():,}: {barren:,} records without an event"
+            )
         if length > MOST_BYTES:
             raise RecordingError(
                 f"{path}: damaged near byte {file.tell():,}: a record of {length} bytes"

@@ -16,6 +16,7 @@ from brrt.manifest import Manifest
 from brrt.recording.cdr import Layout, definition
 from brrt.recording.container import Container
 from brrt.recording.gathering import Gathering
+from brrt.recording.mcap_records import sealed
 from brrt.replay.metrics import Metrics
 from brrt.worlds.world import World
 
@@ -36,7 +37,8 @@ class McapSink:
     """Writes every event, in order, to an MCAP file that stock tools read.
 
     Manifest and world come first, so that a cut file keeps them; the figures come last. A chunk
-    is on its way to the disk at the latest a second after its first event was written.
+    is written at the latest by the first batch that comes half a second after its first event; in
+    a `Background`, as `brrt plan` has it, that is so though the planner falls silent.
 
     Args:
         path: The file; it is overwritten.
@@ -56,7 +58,7 @@ class McapSink:
         try:
             self._file = Container(self._path, library)
             self._file.declare(*_schemas(manifest.dof), *_channels())
-            self._file.metadata(RUN, manifest.to_strings())
+            self._file.metadata(RUN, sealed(manifest.to_strings()))
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
             self._file.flush()
         except OSError as error:
@@ -86,7 +88,7 @@ class McapSink:
                 if whole:
                     figures = self._metrics.as_dict()
                     texts = {name: json.dumps(value) for name, value in figures.items()}
-                    self._file.metadata(RESULT, texts)
+                    self._file.metadata(RESULT, sealed(texts))
                 self._file.finish()
         finally:
             with self._failing():

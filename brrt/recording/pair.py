@@ -1,38 +1,29 @@
 """Two runs in one picture: side by side, their plots over each other, and where they part."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from brrt.colours import Colour
-from brrt.events import Events, Kind
+from brrt.events import Events
 from brrt.manifest import Manifest
-from brrt.recording import landscape, scene
+from brrt.recording import scene
 from brrt.recording.canvas import moments
 from brrt.recording.columns import time_columns
 from brrt.recording.drawing import Drawing
+from brrt.recording.mark import place_of, ring
 from brrt.recording.rerun import recording_id
 from brrt.recording.stream import filled, new_stream
 from brrt.replay.diff import Difference, first_difference
 from brrt.worlds.world import World
 
-MARK: Colour = (255, 64, 216)
-"""Where two runs part; like nothing else in the picture."""
 LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
 """Of the plots, for each run."""
 _SHADES = 0.12
 """How much lighter each further line of a run is in one plot."""
-_RING = {2: 0.02, 3: 0.04}
-"""Radius of the ring around the place where they part, as a part of the world's extent; by the
-world's dimensions."""
-_CIRCLE = np.linspace(0, 2 * np.pi, 49)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +68,9 @@ def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
             _draw(branch, side)
             if difference is not None:
                 other = difference.right if side is left else difference.left
-                _mark(branch, side, difference.seq, other)
+                place = place_of(side.events, side.manifest, difference.seq, other)
+                text = f"first difference: event {difference.seq}"
+                ring(branch, side.manifest, side.world, place, text)
         if difference is not None:
             _tell(rec, max(left, right, key=lambda side: len(side.events)), difference)
     return difference
@@ -126,52 +119,6 @@ def _draw(branch: Any, side: Side) -> None:
     drawing.close()
     text = f"**{side.name}**\n\n{scene.document(side.manifest)}"
     branch.log("/run", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-
-
-def _mark(branch: Any, side: Side, seq: int, other: Mapping[str, Any] | None) -> None:
-    """Ring the place where the runs part, at all times: it is what one looks for."""
-    robot = side.manifest.make_robot()
-    place = scene.places([_place(side, seq, other)], robot)
-    ring = _RING[side.world.dim]
-    axes = np.eye(side.world.dim) * ring * side.world.extent
-    rings = [
-        place + np.outer(np.cos(_CIRCLE), a) + np.outer(np.sin(_CIRCLE), b)
-        for a, b in combinations(axes, 2)
-    ]
-    layer = {"draw_order": 110} if side.world.dim == 2 else {}
-    strips: Any = rr.LineStrips2D if side.world.dim == 2 else rr.LineStrips3D
-    shape = strips(rings, colors=MARK, radii=-2, **layer)
-    branch.log("/world/difference", shape, static=True)
-    text = f"first difference: event {seq}"
-    landscape.log_label(branch, side.world, "difference", place, MARK, text, ring + 0.012)
-
-
-def _place(side: Side, seq: int, other: Mapping[str, Any] | None) -> NDArray[np.float64]:
-    """Return the configuration that an event is about; without one, the newest before.
-
-    Args:
-        side: The run.
-        seq: The event's number.
-        other: The other run's event, to find the waypoint at which two paths part.
-    """
-    until = side.events.until(seq=seq)
-    newest = {kind: table[-1] for kind, table in until.tables.items()}
-    if not newest:
-        return np.array(side.manifest.start)
-    kind, row = max(newest.items(), key=lambda item: int(item[1]["seq"]))
-    if kind is Kind.PATH:
-        theirs = () if other is None else other.get("waypoints", ())
-        pairs = zip(row["waypoints"], theirs, strict=False)
-        parted = (i for i, (ours, their) in enumerate(pairs) if (ours != their).any())
-        return np.asarray(row["waypoints"][next(parted, -1)])
-    if kind in (Kind.REWIRE, Kind.CONNECT):
-        edges = until[Kind.EDGE]
-        tree = row["tree"] if kind is Kind.REWIRE else 0
-        return np.asarray(edges["q"][(edges["tree"] == tree) & (edges["node"] == row["node"])][0])
-    placed = [each for each in newest.values() if "q" in (each.dtype.names or ())]
-    if not placed:
-        return np.array(side.manifest.start)
-    return np.asarray(max(placed, key=lambda each: int(each["seq"]))["q"])
 
 
 def _tell(rec: Any, side: Side, difference: Difference) -> None:

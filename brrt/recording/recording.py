@@ -126,4 +126,4 @@ class Recording:
 
     def check(self) -> list[Finding]:
         """Hold the run to what its planner promises; return what it breaks."""
-        return check(self.manifest, self.world, self.events())
+        return check(self.manifest, self.world, self.events(), figures=self.result)

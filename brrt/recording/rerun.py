@@ -33,7 +33,8 @@ a chunk begins with the same offsets, 4 bytes a row, which so take no space but 
 class RerunSink:
     """Writes every event, exactly, to an .rrd file or a live viewer, and draws what happens.
 
-    Manifest and world come first; if the run ended well, its figures come last.
+    Manifest and world come first; if the run ended well, its figures come last. What waits to be
+    written does not do so for long, as in `McapSink`.
 
     Args:
         manifest: The run's.
@@ -131,9 +132,10 @@ class RerunSink:
             entity = f"{EVENTS}{kind.label}"
             columns = event_columns(archetype(entity), FIELDS[kind], table)
             self._rec.send_columns(entity, time_columns(table), columns)
+        self._flush()  # ahead of the drawing: a file that is cut there lacks none of these events
         self._drawing.write(events)
         self._metrics.write(events)
-        self._flush()
+        self._hand_on()
 
     def _disconnect(self) -> None:
         try:
@@ -168,7 +170,8 @@ class RerunSink:
     def _flush(self) -> None:
         """Hand everything on now: a killed run leaves all but its last batch.
 
-        Behind it comes a checksum of the file so far, since the format has none.
+        Behind it comes a checksum of the file so far, since the format has none; what is read of
+        a file that was cut are the events ahead of its last checksum.
         """
         self._hand_on()
         if self._drain is not None:

@@ -107,6 +107,10 @@ class Outline:
             if length > size - body:
                 break
             if kind == STREAM_ENDS:
+                rest = file.read(FRAME.size)
+                if rest and not any(rest) and not length and END not in self.texts:
+                    # A disk that lost its power may fill up what it did not write.
+                    raise CutError(f"{self.path}: the file is cut at byte {at:,}: zeros follow")
                 return
             if length > MOST_BYTES:
                 raise self.damaged(at, f"a message of {length:,} bytes")

@@ -53,8 +53,9 @@ class Thinning:
 
     def worth(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
-        steps = ((places - self._lower) * self._scale).astype(np.intp)
-        cells = np.ravel_multi_index(tuple(steps.T), self._grid, mode="clip")
+        steps = (places - self._lower) * self._scale
+        steps = np.clip(steps, 0, np.array(self._grid) - 1).astype(np.intp)
+        cells = np.ravel_multi_index(tuple(steps.T), self._grid)
         begin = min(max(self.full - self.count, 0), len(places))
         self._taken[cells[:begin]] = True
         late = cells[begin:]

@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Kind, Table
+from brrt.events import LATEST_NS, Events
 from brrt.manifest import Manifest
-from brrt.worlds.convex import GREATEST
+from brrt.replay.possible import check_possible
 from brrt.worlds.loaders.loader import MOST_LISTS
 from brrt.worlds.world import World
 
@@ -18,9 +17,6 @@ MOST_BYTES = 1 << 28
 """Bytes that one piece of a file may hold: a length that lies must not exhaust the memory."""
 
 _MOST_DOF = 4096
-
-_LONGEST = 1 << 60
-"""Nanoseconds of a run, 36 years, and iterations."""
 
 
 class CutError(RecordingError):
@@ -68,7 +64,7 @@ def _together(manifest: Manifest, world: World) -> None:
     for name, q in (("start", manifest.start), ("goal", manifest.goal)):
         if len(q) != manifest.dof:
             raise BrrtError(f"damaged: {name} has {len(q)} numbers, and not {manifest.dof}")
-    if not 0 <= manifest.epoch_ns < 1 << 62:
+    if not 0 <= manifest.epoch_ns <= LATEST_NS:
         raise BrrtError(f"damaged: it began {manifest.epoch_ns} ns after 1970")
     if manifest.dim != world.dim:
         raise BrrtError(f"damaged: its world is {world.dim}D, and not {manifest.dim}D")
@@ -76,10 +72,6 @@ def _together(manifest: Manifest, world: World) -> None:
         dof = manifest.make_robot().dof(world)
         if dof != manifest.dof:
             raise BrrtError(f"damaged: its robot needs {dof} numbers, and not {manifest.dof}")
-
-
-_SEEN = 27
-"""Cells of a lattice that an event may be the first to show: the one it expands, and all around."""
 
 
 class Numbering:
@@ -109,54 +101,5 @@ class Numbering:
             present[places] = True
         if not present.all():
             raise BrrtError("events are there twice, others not at all")
-        for kind, table in events.tables.items():
-            _possible(kind, table, self.next + n)
+        check_possible(events, self.next + n)
         self.next += n
-
-
-def _possible(kind: Kind, table: Table, count: int) -> None:
-    """See that every value is one that a planner can mean; whether it is right is for the checks.
-
-    Args:
-        kind: Of the events.
-        table: The events.
-        count: Events of the log so far, these included: there are no more nodes.
-
-    Raises:
-        BrrtError: One is not.
-    """
-    _hold(kind, "t", table, 0, _LONGEST)
-    _hold(kind, "iteration", table, 0, _LONGEST)
-    for field in FIELDS[kind]:
-        if field.choices is not None:
-            # Enumerations count from 0 without a gap.
-            _hold(kind, field.name, table, 0, len(field.choices) - 1)
-        elif field.type == "q[]":
-            for at, rows in enumerate(table[field.name]):
-                if not len(rows) or _beyond(rows, -GREATEST, GREATEST).any():
-                    raise _impossible(kind, field.name, table[at])
-        elif field.type in ("q", "float64"):
-            # An estimate is infinite where there is no way out.
-            most = np.inf if field.name == "h" else GREATEST
-            _hold(kind, field.name, table, -GREATEST, most)
-        elif field.type == "int32":
-            _hold(kind, field.name, table, -1, _SEEN * count - 1)
-
-
-def _hold(kind: Kind, name: str, table: Table, least: float, most: float) -> None:
-    values = table[name]
-    # Two passes without a mask in the usual case; they are false of what is not a number, too.
-    if len(values) and not (values.min() >= least and values.max() <= most):
-        wrong = _beyond(values, least, most)
-        raise _impossible(kind, name, table[int(wrong.argmax())])
-
-
-def _beyond(values: NDArray[Any], least: float, most: float) -> NDArray[np.bool_]:
-    """Return which of n events have a number that is out of range or none, shape (n,)."""
-    inside = (values >= least) & (values <= most)
-    return np.asarray(~inside.reshape(len(values), -1).all(axis=1))
-
-
-def _impossible(kind: Kind, name: str, event: np.void) -> BrrtError:
-    value = " ".join(str(event[name]).split())[:60]
-    return BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}")

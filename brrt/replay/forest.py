@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.errors import RecordingError
+from brrt.errors import LogError
 from brrt.events import Events, Kind, Table
 from brrt.replay.ledger import (
     CIRCLE,
@@ -58,7 +58,7 @@ class Tree:
         """Configurations from the root to a node, shape (m, dof).
 
         Raises:
-            RecordingError: The parents do not lead to a root.
+            LogError: The parents do not lead to a root.
         """
         return self.q[self.lineage(node)]
 
@@ -66,25 +66,23 @@ class Tree:
         """Nodes from the root to a node.
 
         Raises:
-            RecordingError: The parents do not lead to a root.
+            LogError: The parents do not lead to a root.
         """
         lineage = [node]
         while self.parent[lineage[-1]] >= 0:
             above = int(self.parent[lineage[-1]])
             if above >= len(self):
-                raise RecordingError(
-                    f"node {lineage[-1]} has the parent {above}, which is not there"
-                )
+                raise LogError(f"node {lineage[-1]} has the parent {above}, which is not there")
             lineage.append(above)
             if len(lineage) > len(self):
-                raise RecordingError(f"node {node} is its own ancestor")
+                raise LogError(f"node {node} is its own ancestor")
         return lineage[::-1]
 
     def below(self, node: int) -> NDArray[np.int64]:
         """Nodes that a node is an ancestor of, level by level, shape (m,).
 
         Raises:
-            RecordingError: The node is its own ancestor.
+            LogError: The node is its own ancestor.
         """
         children = np.argsort(self.parent, kind="stable")
         parents = self.parent[children]
@@ -98,7 +96,7 @@ class Tree:
                 return np.concatenate(found)
             found.append(level)
             total += len(level)
-        raise RecordingError(f"node {node} is its own ancestor")
+        raise LogError(f"node {node} is its own ancestor")
 
 
 def leaves_of(parent: NDArray[np.signedinteger[Any]]) -> int:
@@ -112,7 +110,7 @@ def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
     """Count the edges from the root to the deepest node, shape (n,).
 
     Raises:
-        RecordingError: A node is its own ancestor.
+        LogError: A node is its own ancestor.
     """
     if (parent < np.arange(len(parent))).all():
         return _depth_in_order(parent)
@@ -125,7 +123,7 @@ def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
         steps[on_way] += steps[above]
         up[on_way] = up[above]
         if steps.max() > len(parent):
-            raise RecordingError("a node is its own ancestor")
+            raise LogError("a node is its own ancestor")
     return int(steps.max(initial=0))
 
 
@@ -161,7 +159,7 @@ def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tre
             only grow keep the costs that the log states.
 
     Raises:
-        RecordingError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire names
+        LogError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire names
             a node that is not there, or closes a circle.
     """
     edges, rewired = events[Kind.EDGE], set(np.unique(events[Kind.REWIRE]["tree"]).tolist())
@@ -190,13 +188,13 @@ def check_numbers(rows: Table, tree: int, first: int) -> None:
     """See that the edges of a tree number its nodes on from `first`.
 
     Raises:
-        RecordingError: They do not.
+        LogError: They do not.
     """
     wrong = np.flatnonzero(rows["node"] != np.arange(first, first + len(rows)))
     if len(wrong):
         at = int(wrong[0])
         row = rows[at]
-        raise RecordingError(
+        raise LogError(
             f"event {row['seq']}: node {row['node']} joins tree {tree} as its node {first + at}"
         )
 
@@ -205,7 +203,7 @@ def check_made(made: Changes, verdict: NDArray[np.uint8]) -> None:
     """See that all changes of a tree could be made.
 
     Raises:
-        RecordingError: One could not.
+        LogError: One could not.
     """
     wrong = np.flatnonzero(verdict != SOUND)
     if len(wrong):
@@ -216,4 +214,4 @@ def check_made(made: Changes, verdict: NDArray[np.uint8]) -> None:
             NO_NODE: f"node {node} is rewired before it is there",
             CIRCLE: f"with parent {parent}, node {node} is its own ancestor",
         }[int(verdict[i])]
-        raise RecordingError(f"event {made.seq[i]}: {why}")
+        raise LogError(f"event {made.seq[i]}: {why}")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.errors import RecordingError
+from brrt.errors import LogError
 from brrt.events import Events, Kind, Table
 from brrt.replay.forest import check_made, check_numbers, depth_of, leaves_of
 from brrt.replay.ledger import Changes, Standing, merged
@@ -40,7 +40,7 @@ class Growth:
         """Take in a batch.
 
         Raises:
-            RecordingError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire
+            LogError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire
                 cannot be made.
         """
         edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
@@ -55,7 +55,7 @@ class Growth:
         """Return the figures of each tree.
 
         Raises:
-            RecordingError: A node is its own ancestor, or its parent is not there.
+            LogError: A node is its own ancestor, or its parent is not there.
         """
         return [self._trees[number].figures() for number in sorted(self._trees)]
 
@@ -109,7 +109,7 @@ class _Growing:
         else:
             parent, cost = self.standing.parent.astype(np.int32), self.standing.cost
         if len(parent) and parent.max() >= len(parent):
-            raise RecordingError(
+            raise LogError(
                 f"tree {self.number}: node {int(parent.argmax())} has parent {int(parent.max())}, "
                 f"which is not there"
             )

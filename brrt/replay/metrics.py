@@ -7,12 +7,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.errors import BrrtError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
 from brrt.manifest import Manifest
 from brrt.scenario import Scenario
 
 Path = tuple[float, NDArray[np.float64]]
 """Cost and waypoints."""
+
+
+def _phase(event: Any) -> tuple[Phase, Status]:
+    try:
+        return Phase(int(event["name"])), Status(int(event["status"]))
+    except ValueError as error:
+        raise BrrtError(
+            f"event {event['seq']:,}: {error}; a phase is one of events.Phase"
+        ) from None
 
 
 class Metrics:
@@ -36,7 +46,11 @@ class Metrics:
         self._ended: dict[Phase, tuple[int, Status]] = {}
 
     def write(self, events: Events) -> None:
-        """Take in a batch."""
+        """Take in a batch.
+
+        Raises:
+            BrrtError: There is no such phase, or no such status.
+        """
         for kind, count in events.counts.items():
             self._events += count
             self._counts[kind] += count
@@ -46,7 +60,7 @@ class Metrics:
         for event in events[Kind.PATH]:
             self._take_path(event, events.dof)
         for event in events[Kind.PHASE]:
-            phase, status = Phase(int(event["name"])), Status(int(event["status"]))
+            phase, status = _phase(event)
             if status is Status.BEGIN:
                 self._began[phase] = int(event["t"])
             else:

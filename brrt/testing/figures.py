@@ -1,5 +1,6 @@
 """Figures of one scenario over many seeds, and the file that keeps them."""
 
+import inspect
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -60,7 +61,7 @@ class Figures:
                 raise BrrtError("a budget of time ends each run elsewhere; give iterations instead")
             told = json.loads(json.dumps(source.as_dict()))
             del told["seed"], told["clock"]
-        elif not callable(source):
+        elif not _takes_seed(source):
             raise BrrtError(f"give a scenario or a function of the seed, not {source!r}")
         return cls({seed: _run(source, seed) for seed in numbers}, told, made_by())
 
@@ -109,6 +110,16 @@ class Figures:
     def of_seeds(self, seeds: Iterable[int]) -> Self:
         """Return those of some seeds; of seeds that are not there, none."""
         return replace(self, runs={seed: self.runs[seed] for seed in seeds if seed in self.runs})
+
+
+def _takes_seed(source: Any) -> bool:
+    try:
+        inspect.signature(source).bind(0)
+    except TypeError:
+        return False
+    except ValueError:  # compiled, and so without a signature
+        return callable(source)
+    return True
 
 
 def _run(source: Source, seed: int) -> Mapping[str, Any]:

@@ -12,14 +12,16 @@ always comes to the same verdict: it does not pass today and fail tomorrow.
 """
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
+from brrt.replay.explain.command import command
+from brrt.scenario import Scenario
 from brrt.testing import ranks
 from brrt.testing.figures import PROBLEM, Figures, Source
 
@@ -65,6 +67,7 @@ class Verdict:
         alpha: Chance of a false alarm, over all figures.
         identical: Whether each run's figures are the old ones, to the last bit.
         figures: One for each test.
+        scenario: What the new runs ran; None where a function made them.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Verdict:
     alpha: float
     identical: bool
     figures: tuple[Judged, ...]
+    scenario: Scenario | None = None
 
     @property
     def passed(self) -> bool:
@@ -89,10 +93,14 @@ class Verdict:
         rows += [_row(each, self.seeds) for each in self.figures]
         often = f"{1 / self.alpha:,.0f} changes"
         rows += [f"failed where p <= {share:.2g}: a false alarm at most once in {often}"]
-        for each in self.figures:
-            if not each.passed and each.worst is not None:
-                rows.append(f"look at seed {each.worst}, whose {each.name} grew most")
-        return [head, *rows]
+        worst = (each for each in self.figures if not each.passed and each.worst is not None)
+        return [head, *rows, *(line for each in worst for line in self._look(each))]
+
+    def _look(self, each: Judged) -> Iterator[str]:
+        """Name the seed that became worst, and the command that runs it where there is one."""
+        yield f"look at seed {each.worst}, whose {each.name} grew most"
+        if self.scenario is not None and each.worst is not None:
+            yield "  " + command(replace(self.scenario, seed=each.worst), f"seed{each.worst}.mcap")
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON has it."""
@@ -161,7 +169,8 @@ def judge(
     ]
     _check_solved(judged[0], len(seeds), margins, alpha)
     identical = all(a[figure] == b[figure] for a, b in pairs for figure in a.keys() & b.keys())
-    return Verdict(name, len(seeds), alpha, identical, tuple(judged))
+    scenario = None if new.scenario is None else Scenario.parse(new.scenario)
+    return Verdict(name, len(seeds), alpha, identical, tuple(judged), scenario)
 
 
 def _judge(

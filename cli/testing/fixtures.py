@@ -13,6 +13,7 @@ from typing import NoReturn
 import pytest
 
 from brrt import BrrtError, Comparison, Recording, compare, read
+from brrt.repeat import TOLERANCE
 from brrt.testing import golden
 from brrt.testing.figures import Figures, Source
 from brrt.testing.gate import ALPHA, SEEDS, Verdict, check_question, gate
@@ -39,7 +40,9 @@ class _Files:
 
     def path(self, name: str, ending: str) -> Path:
         """Return a golden file's path, and note that it is used."""
-        stem = str(name).removesuffix(ending)
+        if not isinstance(name, str):
+            raise BrrtError(f"give the name of the golden file first, and not {name!r:.60}")
+        stem = name.removesuffix(ending)
         if not _NAME.fullmatch(stem):
             raise BrrtError(f"name {name!r}: give letters, digits and -_.+=, for a file's name")
         return self.note(Path(self._folder, stem + ending))
@@ -145,10 +148,16 @@ class Golden:
                 _headline(found),
                 *found.lines(),
                 "",
+                *self._rounded(path, fresh, tolerance),
                 f"If that is meant: {_UPDATE}, and commit it.",
             ]
             _fail(kept, "\n".join(lines))
         return fresh
+
+    def _rounded(self, path: Path, fresh: Recording, tolerance: float) -> Iterator[str]:
+        """Say so where another machine's rounding is all that there is."""
+        if tolerance < TOLERANCE and self._compare(path, fresh, TOLERANCE, "the run").equal:
+            yield f"Only the rounding differs: tolerance={TOLERANCE:g} lets that pass."
 
     def _renew(self, path: Path, fresh: Recording, tolerance: float) -> None:
         told = self._files.told(path)
@@ -180,7 +189,7 @@ class Gate:
         self,
         run: Source,
         *,
-        against: str | Source,
+        against: str | Source | None = None,
         seeds: int | Iterable[int] = SEEDS,
         alpha: float = ALPHA,
         **margins: float,
@@ -203,6 +212,11 @@ class Gate:
 
         with _failing():
             check_question(numbers, alpha, margins)
+            if against is None:
+                raise BrrtError(
+                    "say what to hold it against: the name of a golden file (against='forest', "
+                    f"made by {_UPDATE}), or what to run"
+                )
             if isinstance(against, str):
                 path = self._files.path(against, ".json")
                 return self._against(path, Figures.of(run, numbers), judged)

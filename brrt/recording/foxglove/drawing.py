@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.colours import Colour
-from brrt.errors import RecordingError
+from brrt.errors import LogError
 from brrt.events import Events, Kind, Stage, Table
 from brrt.manifest import Manifest
 from brrt.recording import scene
@@ -62,7 +62,7 @@ class Drawing:
         events: From the first event on.
 
     Raises:
-        RecordingError: The trees do not hold together.
+        LogError: The trees do not hold together.
     """
 
     def __init__(self, manifest: Manifest, world: World, events: Events) -> None:
@@ -215,7 +215,7 @@ def _check_nodes(seq: Ints, nodes: NDArray[np.integer], count: int) -> None:
     wrong = np.flatnonzero((nodes < 0) | (nodes >= count))
     if len(wrong):
         i = wrong[0]
-        raise RecordingError(f"event {seq[i]}: there is no node {nodes[i]}; see brrt verify")
+        raise LogError(f"event {seq[i]}: there is no node {nodes[i]}")
 
 
 def _told(topic: str, t: Ints, keys: Ints, draw: Callable[[Ints], Marker]) -> Stream:

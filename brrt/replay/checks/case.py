@@ -1,7 +1,7 @@
 """What rules look at."""
 
-from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
@@ -111,6 +111,8 @@ class Case:
             than one where a run went on from a recorded one with other settings.
         known: Whether the planner is known here, so that there is a contract.
         breaks_off: Says, once the log was read, whether it breaks off.
+        figures: What stands at the recording's end, under the names of `Metrics`; None where
+            nothing does.
     """
 
     manifest: Manifest
@@ -125,6 +127,7 @@ class Case:
     stretches: tuple[tuple[int, Contract], ...]
     known: bool
     breaks_off: Callable[[], bool]
+    figures: Mapping[str, Any] | None = None
 
     @classmethod
     def of(
@@ -133,6 +136,7 @@ class Case:
         world: World,
         contract: Contract | None = None,
         breaks_off: Callable[[], bool] = lambda: False,
+        figures: Mapping[str, Any] | None = None,
     ) -> Self:
         """Open the case of a recording.
 
@@ -141,13 +145,13 @@ class Case:
             world: The run's.
             contract: What the planner promises; by default what the registered one does.
             breaks_off: Says, once the log was read, whether it breaks off.
+            figures: What stands at the recording's end.
 
         Raises:
             BrrtError: Its query is of no use in its world.
         """
-        scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
-        problem = scenario.make_problem(world)
-        known = contract is not None or scenario.planner in PLANNERS
+        problem = manifest.make_problem(world)
+        known = contract is not None or manifest.scenario.planner in PLANNERS
         stretches: tuple[tuple[int, Contract], ...] = ((0, contract or Contract()),)
         if contract is None and known:
             stretches = tuple(
@@ -157,13 +161,14 @@ class Case:
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
             manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
-            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off,
+            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off, figures,
         )  # fmt: skip
 
     @cached_property
     def scripts(self) -> Scripts:
         """The log's events in one table, iteration by iteration, for rules that read it so."""
-        return Scripts(self.dof, {first for first, _ in self.stretches})
+        growing = any(contract.growth is not None for _, contract in self.stretches)
+        return Scripts(self.dof, {first for first, _ in self.stretches}, growing=growing)
 
     @cached_property
     def events(self) -> Events:

@@ -51,18 +51,23 @@ class Kept:
     Args:
         dof: Numbers in a configuration.
         contract: What the planner promises.
+
+    Attributes:
+        last_iteration: The greatest so far.
+        count: Events so far, kept or not.
     """
 
     def __init__(self, dof: int, contract: Contract) -> None:
         self._dof, self._contract = dof, contract
         self._parts: dict[Kind, list[Table]] = {kind: [] for kind in Kind}
-        self.last_iteration = 0
+        self.last_iteration = self.count = 0
 
     def take(self, window: Events) -> None:
         """Keep what is needed of the next events."""
         for kind, table in window.tables.items():
             if not len(table):
                 continue
+            self.count += len(table)
             self.last_iteration = max(self.last_iteration, int(table["iteration"].max()))
             rows = self._needed(kind, table)
             if rows is not None:

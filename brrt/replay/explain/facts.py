@@ -1,6 +1,6 @@
 """All that an explanation knows: figures, each computed from the recording."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -224,10 +224,9 @@ def facts(moment: Moment, file: str, robot: Robot, gather: Gather) -> Facts:
 
 
 def _contract(manifest: Manifest, world: World) -> Contract | None:
-    scenario = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
-    if scenario.planner not in PLANNERS:
+    if manifest.scenario.planner not in PLANNERS:
         return None
-    return scenario.make_planner().contract(scenario.make_problem(world))
+    return manifest.scenario.make_planner().contract(manifest.make_problem(world))
 
 
 def _way(
