@@ -44,8 +44,11 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
     "few iterations": ({"world": "squares2d:n=120,seed=4", "iterations": 300}, None),
     "few iterations, connect": ({"world": "squares2d:n=120,seed=4", "iterations": 100,
                                  "planner": "rrt-connect"}, None),
-    "few iterations, arm": ({"world": "circles2d:n=25,seed=3", "robot": "chain",
-                             "start": "random", "goal": "random", "iterations": 20}, None),
+    "few iterations, arm": (
+        {"world": "circles2d:n=14,size=20,min_radius=0.5,max_radius=1,seed=3", "robot": "chain",
+         "start": (1.2, 0.5, -0.5), "goal": (-1.2, -0.5, 0.5), "planner": "rrt-connect",
+         "iterations": 50}, None,
+    ),
     "body too wide": ({"world": "passage2d:gap=6", "robot": "polygon:length=8,width=7",
                        "planner": "rrt-connect", "iterations": 2000}, None),
     "body too wide, room": ({"world": "polygons2d:n=25", "iterations": 5000,
@@ -66,6 +69,9 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
     "star, gap": ({"world": "gap2d:gap=1", "planner": "rrt-star", "iterations": 3000}, None),
     "lrta, bug trap": ({"world": "bugtrap2d", "planner": "lrta-star",
                         "params": {"epsilon": 2}}, None),
+    "lrta, few iterations": ({"world": "bugtrap2d", "planner": "lrta-star",
+                              "iterations": 500}, None),
+    "a-star, few iterations": ({"world": "maze2d", "planner": "a-star", "iterations": 300}, None),
     "a-star, coarse cells": ({"world": "passage2d:gap=2", "planner": "a-star",
                               "params": {"epsilon": 7}}, None),
 }  # fmt: skip

@@ -6,7 +6,7 @@ from brrt.planners import PLANNERS
 from brrt.replay.explain import failed
 from brrt.replay.explain.facts import Facts
 from brrt.replay.explain.proposal import Advice, change, further, go_on, look, recording, rounded
-from brrt.replay.explain.signs import step_of, stuck
+from brrt.replay.explain.signs import limited, step_of, stuck
 from brrt.replay.explain.tell import place
 
 MOST = 3
@@ -72,6 +72,8 @@ def look_ahead(f: Facts) -> Advice | None:
         f"each cell was entered {often:.3g} times; the estimate at {place(deepest['q'])} had to "
         f"rise by {deepest['learnt']:.4g}"
     )
+    if limited(f):  # what was learnt stays right whatever the lookahead is
+        return further(f, why, 10, params={"lookahead": min(10_000, max(100, 10 * lookahead))})
     return change(f, why, params={"lookahead": min(10_000, max(10, 10 * lookahead))})
 
 
@@ -83,7 +85,7 @@ def enough(f: Facts) -> Advice | None:
     gain = 1 - p.best_cost / p.half_cost if p.half_cost > 0 else 0.0
     if gain >= 0.01:
         why = f"the second half of the run still took {gain:.1%} off the path"
-        return further(f, why, 2)
+        return further(f, why, 2, least=1)
     why = f"the second half of the run took {gain:.2%} off the path"
     half = max(1, f.figures["iterations"] // 2)
     if f.manifest.branches and half <= f.manifest.branches[-1].iteration:
@@ -141,7 +143,8 @@ def slow_tree(f: Facts) -> Advice | None:
 _LOOKS: tuple[Rule, ...] = (failed.no_way, failed.too_wide)
 _UNSOLVED: tuple[Rule, ...] = (
     *_LOOKS, cut_short, failed.small_cells, failed.goal_bias, short_step, failed.young,
-    failed.second_tree, failed.long_step, look_ahead, failed.longer,
+    failed.unseen, failed.second_tree, failed.long_step, look_ahead, failed.all_cells,
+    failed.longer,
 )  # fmt: skip
 _SOLVED: tuple[Rule, ...] = (
     cut_short, late_moves, short_step, slow_tree, look_ahead, enough, informed,
@@ -152,6 +155,9 @@ _INSTEAD: Mapping[Rule, tuple[Rule, ...]] = {
     failed.too_wide: _UNSOLVED,
     failed.goal_bias: (failed.young, failed.longer),
     short_step: (failed.young, failed.second_tree, failed.longer),
-    failed.young: (failed.longer,),
+    failed.young: (failed.unseen, failed.longer),
+    failed.unseen: (failed.longer,),
+    failed.all_cells: (failed.longer,),
+    look_ahead: (failed.longer,),
 }
 """Rules that have nothing to say once another one has found a cause."""

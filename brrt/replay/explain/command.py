@@ -1,9 +1,15 @@
 """Settings as the words of the command that plans by them."""
 
+import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from brrt.scenario import Scenario
+
+
+def command(scenario: Scenario, out: str = "next.mcap") -> str:
+    """Write a scenario as the command that runs it, and records to `out`."""
+    return shlex.join([*plan_words(scenario), "--out", out])
 
 
 def plan_words(scenario: Scenario) -> list[str]:

@@ -1,6 +1,6 @@
 """All that an explanation knows: figures, each computed from the recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -113,7 +113,7 @@ class Facts:
         file: The recording, as the command line takes it; empty where it is in no file.
         ended: Whether the recording is told to its end, and not to an instant before.
         contract: What its planner promises, as its step; None where it is not known here.
-        extent: The longest side of the world's bounds.
+        sides: Those of the world's bounds.
         figures: Those that `brrt replay --json` prints.
         tenths: The run's course.
         trees: Numbers of the trees.
@@ -135,7 +135,7 @@ class Facts:
     file: str
     ended: bool
     contract: Contract | None
-    extent: float
+    sides: list[float]
     figures: dict[str, Any]
     tenths: list[Tenth]
     trees: list[int]
@@ -156,6 +156,11 @@ class Facts:
     def scenario(self) -> Scenario:
         """What was run."""
         return self.manifest.scenario
+
+    @property
+    def extent(self) -> float:
+        """The longest side of the world's bounds."""
+        return max(self.sides)
 
     @property
     def narrow(self) -> Narrow | None:
@@ -180,7 +185,7 @@ class Facts:
             del plain[name]
         way = plain.pop("way")
         way["way"] = way.pop("reason")
-        return {**plain, **way, "acceptance": self.acceptance}
+        return {**plain, **way, "extent": self.extent, "acceptance": self.acceptance}
 
 
 def facts(moment: Moment, file: str, robot: Robot, gather: Gather) -> Facts:
@@ -204,7 +209,7 @@ def facts(moment: Moment, file: str, robot: Robot, gather: Gather) -> Facts:
         file=file,
         ended=not moment.limits,
         contract=contract,
-        extent=world.extent,
+        sides=(world.upper - world.lower).tolist(),
         figures=figures,
         tenths=_tenths(gather, figures["iterations"], manifest.scenario.clock == "logical"),
         trees=gather.trees,

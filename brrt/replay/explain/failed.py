@@ -1,8 +1,10 @@
 """What to try after a run that found no path: rules, each from figures to a command."""
 
+import math
+
 from brrt.replay.explain.command import text
 from brrt.replay.explain.facts import Facts
-from brrt.replay.explain.proposal import Advice, change, further, look, recording, rounded
+from brrt.replay.explain.proposal import Advice, change, further, go_on, look, recording, rounded
 from brrt.replay.explain.signs import grows, is_young, limited, step_of, stuck, width_of
 from brrt.replay.explain.tell import counted
 from brrt.replay.explain.way import at_least, at_most
@@ -109,6 +111,28 @@ def long_step(f: Facts) -> Advice | None:
     return change(f, why, params={"step": rounded(max(f.narrow.low, f.narrow.high / 4))})
 
 
+def unseen(f: Facts) -> Advice | None:
+    """Cells were too coarse to tell whether there is a way: only a search could."""
+    if not limited(f) or f.way.connected is not None or f.way.widest is None:
+        return None
+    return further(f, f"{f.way.reason}: a longer search may find it", 50)
+
+
+def all_cells(f: Facts) -> Advice | None:
+    """The search for a shortest path on a lattice has its end: each cell is expanded once."""
+    lattice = None if f.contract is None else f.contract.lattice
+    if lattice is None or lattice.lookahead is not None or f.figures["status"] != "iteration limit":
+        return None
+    cells = math.prod(int(side / lattice.epsilon) + 1 for side in f.sides)
+    if cells <= f.figures["iterations"]:
+        return None
+    why = (
+        f"{counted(f.figures['iterations'], 'cell')} were expanded; the bounds hold {cells:,}, and "
+        "none is expanded twice"
+    )
+    return go_on(f, why, iterations=cells)
+
+
 def longer(f: Facts) -> Advice | None:
     """The run was still getting somewhere when its budget ended."""
     if not limited(f):
@@ -128,10 +152,7 @@ def anything(f: Facts) -> Advice | None:
     """The budget ended the run, and nothing else has anything to say."""
     if not limited(f):
         return None
-    why = "the budget ended the run, and no figure tells that it was stuck"
-    if f.way.connected is None and f.way.widest is not None:
-        why = f"{f.way.reason}: a longer search may find it"
-    return further(f, why, 10)
+    return further(f, "the budget ended the run, and no figure tells that it was stuck", 10)
 
 
 def _ends(f: Facts) -> list[str]:

@@ -17,6 +17,9 @@ from brrt.scenario import Scenario
 _PLENTY = 1_000_000
 """Iterations beyond which a run is advised no more than four times as many."""
 
+_LITTLE = 20_000
+"""Iterations that take so little time that fewer are not worth advising."""
+
 _UNNAMED = "RUN"
 """Stands in commands for a recording that is in no file."""
 
@@ -158,13 +161,23 @@ def recording(f: Facts) -> str:
     return f.file or _UNNAMED
 
 
-def further(f: Facts, why: str, times: int) -> Advice:
-    """Advise a budget that is so many times as large, of the kind that ended the run."""
+def further(
+    f: Facts, why: str, times: int, least: int = _LITTLE, params: Mapping[str, Any] | None = None
+) -> Advice:
+    """Advise a budget that is so many times as large, of the kind that ended the run.
+
+    Args:
+        f: What is known.
+        why: What the advice follows from.
+        times: How many times.
+        least: Iterations that are worth a try in any case.
+        params: Settings of the planner that are changed.
+    """
     if f.figures["status"] == "time limit" and f.scenario.time is not None:
-        return go_on(f, why, time=rounded(times * f.scenario.time))
+        return go_on(f, why, params=params, time=rounded(times * f.scenario.time))
     done = max(f.figures["iterations"], 1)
-    most = min(times * done, max(4 * done, _PLENTY))
-    return go_on(f, why, iterations=round(most, 1 - len(str(most))))
+    most = min(max(times * done, least), max(4 * done, _PLENTY))
+    return go_on(f, why, params=params, iterations=round(most, 1 - len(str(most))))
 
 
 def rounded(value: float) -> float:
