@@ -2,6 +2,7 @@
 
 import shlex
 from pathlib import Path
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -170,10 +171,10 @@ def _show(run: Path, tallies: "list[Tally]", *, long: bool) -> None:
         promise = "" if long or tally.broken else _short(tally.promise, _WIDTH - len(line) - 2)
         out.print(f"{line}  {promise}".rstrip(), style=_style(tally), markup=False, soft_wrap=True)
         if long or tally.broken:
-            out.print(f"  {tally.promise}", style="dim", markup=False, soft_wrap=True)
+            _tell(tally.promise, style="dim")
         for found in tally.findings[:_SHOWN]:
             where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
-            out.print(f"  {where}: {found.message}", markup=False, soft_wrap=True)
+            _tell(f"{where}: {found.message}")
         if tally.broken > _SHOWN:
             out.print(f"  ... and {tally.broken - _SHOWN:,} more")
         if tally.findings:
@@ -182,6 +183,13 @@ def _show(run: Path, tallies: "list[Tally]", *, long: bool) -> None:
     broken = sum(bool(tally.broken) for tally in looked)
     total = f"{len(looked)} rules, {broken} broken" if broken else f"all {len(looked)} rules hold"
     out.print(total, style="bold red" if broken else "bold green")
+
+
+def _tell(text: str, style: str = "") -> None:
+    """Print a sentence below its rule, no wider than a terminal."""
+    whole = TextWrapper(_WIDTH, "  ", "    ", break_long_words=False, break_on_hyphens=False)
+    for line in whole.wrap(text):
+        out.print(line, style=style, markup=False, soft_wrap=True)
 
 
 def _style(tally: "Tally") -> str:

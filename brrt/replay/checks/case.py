@@ -230,10 +230,26 @@ class Case:
         """For each motion the number of an obstacle that it runs into, or -1."""
         return first_hits(self.obstacles, self.robot, np.asarray(a), np.asarray(b))
 
-    def look_free(self, tally: Tally, table: Table, a: Floats, b: Floats, what: str) -> None:
-        """See that the motion of each row of a table is free; shapes (n, dof)."""
+    def look_free(
+        self, tally: Tally, table: Table, a: Floats, b: Floats, what: str, name: str | None = None
+    ) -> None:
+        """See that the motion of each row of a table is free.
+
+        Args:
+            tally: Takes it in.
+            table: The events, shape (n,).
+            a: Where motions begin, shape (n, dof).
+            b: Where they end, shape (n, dof).
+            what: What a motion is.
+            name: The field that tells it from others; None where none does.
+        """
         hit = self.blocked(a, b)
-        tally.look(table, hit >= 0, lambda i: f"{what} hits {self.obstacles.name(int(hit[i]))}")
+
+        def say(i: int) -> str:
+            which = what if name is None else f"{what} {table[name][i]}"
+            return f"{which} hits {self.obstacles.name(int(hit[i]))}"
+
+        tally.look(table, hit >= 0, say)
 
     @cached_property
     def trees(self) -> list[Grown]:
