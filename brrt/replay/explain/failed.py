@@ -66,7 +66,8 @@ def goal_bias(f: Facts) -> Advice | None:
     if goals is None or bias <= 0.2 or not samples or goals.failed < 0.9 * goals.drawn:
         return None
     by = f", most by {goals.blockers[0].name}" if goals.blockers else ""
-    why = f"goal bias {bias:g} drew {goals.drawn:,} goals and {goals.failed:,} were rejected{by}"
+    drawn = counted(goals.drawn, "goal")
+    why = f"goal bias {bias:g} drew {drawn}, and {goals.failed:,} of them in vain{by}"
     return change(f, why, params={"goal_bias": 0.05})
 
 
