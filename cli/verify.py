@@ -53,8 +53,9 @@ def verify(
 ) -> None:
     """Hold a recording to what its planner promises, by code that is not the planner's.
 
-    Exit code 0: every promise is kept; 1: one is broken. Whether draws are as even and as biased
-    as stated is judged by tests that wrong one sound recording in a million at most.
+    Exit code 0: every promise is kept; 1: one is broken. Whether draws are as
+    even and as biased as stated is judged by tests that wrong one sound
+    recording in a million at most.
 
     brrt verify run.mcap
 

@@ -66,7 +66,7 @@ class Recording:
             BrrtError: More than one is given, or it is no number from 0 on.
         """
         limits = instant(time=time, event=event, iteration=iteration)
-        return Moment(self.manifest, self.world, self.batches, limits)
+        return Moment(self.manifest, self.world, self.batches, limits, self.name)
 
     def robot(self) -> Robot:
         """Make the robot as it was, settled in the world."""

@@ -136,12 +136,14 @@ class Moment:
         world: Where it took place.
         batches: Call it for the whole log.
         limits: The instant, as `Events.until` takes it; the end where it is empty.
+        name: The recording's file; empty where there is none.
     """
 
     manifest: Manifest
     world: World
     batches: Callable[[], Iterator[Events]]
     limits: Mapping[str, int]
+    name: str = ""
 
     def __repr__(self) -> str:
         scenario = self.manifest.scenario
