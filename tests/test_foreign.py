@@ -200,7 +200,7 @@ class Babble:
         (Babble(Kind.SAMPLE, tree=0, source=0, q=[1, np.nan]), "sample has q = [ 1. nan]"),
         (Babble(Kind.PATH, stage=5, cost=1.0, waypoints=[[1, 1]]), "path has stage = 5; there is"),
     ],
-    ids=str,
+    ids=["phase", "status", "source", "not a number", "stage"],
 )
 def test_what_no_event_can_say(planner: Babble, message: str, tmp_path: Path) -> None:
     """It is an error at once, whatever the sink; what was said before it can be read."""
