@@ -17,7 +17,7 @@ def diff(
     b: Annotated[Path, typer.Argument(help="Another.", metavar="B")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Compare two runs: settings, versions, outcome, figures, and the first event that differs.

@@ -17,7 +17,7 @@ def explain(
     at_event: AtEvent = None,
     at_iteration: AtIteration = None,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object with every figure.")

@@ -24,7 +24,7 @@ def export(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Write a run in a form that other viewers show.

@@ -93,7 +93,7 @@ def plot(
     ] = 20.0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Draw a run for a paper: its trees, the cost of its best path, where the time goes.

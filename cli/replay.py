@@ -45,7 +45,7 @@ def replay(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording of it.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
     text: Annotated[
         bool,

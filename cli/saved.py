@@ -1,5 +1,6 @@
-"""The events of a recording, of one that was cut as far as they are whole."""
+"""The events of a recording; of one that was cut or damaged, as far as they are whole."""
 
+import shlex
 from collections.abc import Callable, Iterator
 from functools import wraps
 from typing import TYPE_CHECKING, Any
@@ -29,11 +30,11 @@ def naming_runs(command: Callable[..., None]) -> Callable[..., None]:
 
 
 class Saved:
-    """Yields a recording's batches; where the file is cut, says what was saved.
+    """Yields a recording's batches; where the file is cut or damaged, says what was saved.
 
     Args:
         recording: The recording.
-        partial: Whether the user takes what is whole of a file that was cut.
+        partial: Whether the user takes what is whole of such a file.
         verb: What the command does with it.
     """
 
@@ -43,7 +44,7 @@ class Saved:
 
     def __iter__(self) -> "Iterator[Events]":
         from brrt.errors import RecordingError  # noqa: PLC0415 - keep --help fast
-        from brrt.recording import CutError  # noqa: PLC0415
+        from brrt.recording import BrokenError  # noqa: PLC0415
 
         self.events, last = 0, 0
         try:
@@ -51,13 +52,25 @@ class Saved:
                 self.events += len(batch)
                 last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
                 yield batch
-        except CutError as error:
-            verb = "is" if self.events == 1 else "are"
-            saved = f"{counted(self.events, 'event')} up to {last / 1e9:.6f} s {verb} whole"
+        except BrokenError as error:
+            found = f"{error}; {told_of(self.events, last / 1e9, complete=error.complete)}"
             if not self._partial:
-                raise RecordingError(
-                    f"{error}; {saved}: {self._verb} with --partial, or save them with brrt recover"
-                ) from None
+                remedy = f"brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
+                if self.events:
+                    remedy = f"{self._verb} with --partial, or save them with {remedy}"
+                else:
+                    remedy = f"{remedy} saves the problem alone"
+                raise RecordingError(f"{found}: {remedy}") from None
             if not self.cut:  # it may be read more than once
-                note(f"{error}; {saved}")
+                note(found)
             self.cut = True
+
+
+def told_of(events: int, until_s: float, *, complete: bool) -> str:
+    """Say how many events are whole of a file that is not."""
+    if not events:
+        return "no event is whole"
+    until = f"{counted(events, 'event')} up to {until_s:.6f} s"
+    if complete:
+        return f"no event is lost, all {until} are whole"
+    return f"{until} {'is' if events == 1 else 'are'} whole"

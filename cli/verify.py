@@ -27,7 +27,7 @@ def verify(
         bool,
         typer.Option(
             "--partial",
-            help="Judge what is whole of a file that was cut; what is promised of a run's end "
+            help="Judge what is whole of a cut or damaged file; what is promised of a run's end "
             "is left out.",
         ),
     ] = False,

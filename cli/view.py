@@ -64,7 +64,7 @@ def view(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the picture.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Look at a recording, or at two side by side with a ring where they part.

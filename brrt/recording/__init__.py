@@ -10,7 +10,7 @@ from brrt.recording.mcap_reader import read_mcap
 from brrt.recording.mcap_writer import McapSink
 from brrt.recording.memory import Memory
 from brrt.recording.recording import Recording
-from brrt.recording.sound import CutError
+from brrt.recording.sound import BrokenError, CutError, DamagedError
 
 _RRD = b"RRF"
 
@@ -23,7 +23,9 @@ def read(path: Path | str) -> Recording:
     """
     path = Path(path)
     try:
-        if not (path.is_file() or path.is_dir()) and is_there(path):
+        if path.is_dir():
+            raise RecordingError(f"{path}: is a folder; name a recording in it, .mcap or .rrd")
+        if not path.is_file() and is_there(path):
             raise RecordingError(f"{path}: no file but a pipe or a device; save it to a file first")
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))
@@ -38,4 +40,13 @@ def read(path: Path | str) -> Recording:
     raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
 
 
-__all__ = ["CutError", "McapSink", "Memory", "Recording", "read", "read_mcap"]
+__all__ = [
+    "BrokenError",
+    "CutError",
+    "DamagedError",
+    "McapSink",
+    "Memory",
+    "Recording",
+    "read",
+    "read_mcap",
+]
