@@ -1,16 +1,14 @@
 """`brrt view`: a recording, or two, in the Rerun viewer: a window, the browser, or a picture."""
 
 import re
-import signal
+import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import Watch, out
+from .console import SIGNALLED, Watch, out
 from .instants import At, AtEvent, AtIteration, beyond, instant
 from .saved import Saved
 
@@ -83,7 +81,10 @@ def view(
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
-    with tempfile.TemporaryDirectory(prefix="brrt-") as folder, _ending_in_order():
+    from brrt.planners.stop import handling_signals  # noqa: PLC0415 - keep --help fast
+
+    # Ended by a signal as by Ctrl-C, nothing that we started or wrote for a while outlives us.
+    with tempfile.TemporaryDirectory(prefix="brrt-") as folder, handling_signals(_end):
         with Watch(None, "drawing").running() as watch:
             file, cursor, *marks = _prepare(runs, limits, Path(folder), watch, partial=partial)
         if web:
@@ -263,19 +264,5 @@ def _serve(file: Path, runs: list[Path], port: int | None) -> None:
         server.close()
 
 
-@contextmanager
-def _ending_in_order() -> Iterator[None]:
-    """End by a signal as by Ctrl-C: nothing that we started or wrote for a while outlives us."""
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
-        numbers.append(signal.SIGHUP)
-    before = [signal.signal(number, _interrupt) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
+def _end(number: int, _: object) -> None:
+    sys.exit(SIGNALLED + number)

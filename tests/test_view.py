@@ -378,7 +378,7 @@ def test_web_is_for_this_machine_and_ends_in_order(number: int, tmp_path: Path) 
         assert ports.keys() == {url.port, source.port}
         assert list(tmp_path.glob("brrt-*"))
         process.send_signal(number)
-        assert process.wait(20) == 130
+        assert process.wait(20) == 128 + number
     assert not child.is_running()
     assert not list(tmp_path.glob("brrt-*"))
 

@@ -52,7 +52,7 @@ def parsed(path: Path, kind: Any, data: bytes) -> Any:
     try:
         return kind.read(ReadDataStream(BytesIO(data)))
     except Exception as error:  # noqa: BLE001 - mcap raises whatever a damaged length leads to
-        raise DamagedError(path, f"damaged {kind.__name__}: {error}") from None
+        raise DamagedError(path, f"damaged {kind.__name__}: {str(error) or repr(error)}") from None
 
 
 def sealed(texts: Mapping[str, str]) -> dict[str, str]:
