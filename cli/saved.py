@@ -56,11 +56,10 @@ class Saved:
             found = f"{error}; {told_of(self.events, last / 1e9, complete=error.complete)}"
             if not self._partial:
                 remedy = f"brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
-                if self.events:
-                    remedy = f"{self._verb} with --partial, or save them with {remedy}"
-                else:
-                    remedy = f"{remedy} saves the problem alone"
-                raise RecordingError(f"{found}: {remedy}") from None
+                what, them = (self._verb, "them") if self.events else ("take the problem", "it")
+                raise RecordingError(
+                    f"{found}: {what} with --partial, or save {them} with {remedy}"
+                ) from None
             if not self.cut:  # it may be read more than once
                 note(found)
             self.cut = True

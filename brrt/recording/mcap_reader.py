@@ -99,7 +99,7 @@ class _Walk:
     def __init__(self, decoder: Decoder, texts: Mapping[str, str]) -> None:
         self.decoder, self._path, self._texts = decoder, decoder.path, texts
         self._figures: Mapping[str, Any] | None = None
-        self._sound = False
+        self._sound, self._same = False, False
 
     def chunks(self, file: IO[bytes]) -> Iterator[tuple[bytes, Index]]:
         """Yield each chunk and its indexes.
@@ -172,7 +172,8 @@ class _Walk:
             except RecordingError as error:
                 self.decoder.note(error)
             else:
-                if metadata.name == RUN and metadata.metadata != self._texts:
+                self._same = self._same or metadata.metadata == self._texts
+                if metadata.name == RUN and not self._same:
                     raise ReplacedError(self._path)
 
     def judge(self) -> None:
@@ -180,7 +181,10 @@ class _Walk:
 
         Raises:
             BrokenError: They were not, or something else is wrong with the file.
+            ReplacedError: It is another file by now.
         """
+        if not self._same:
+            raise ReplacedError(self._path)
         count, wrong, end = self.decoder.numbering.next, self.decoder.wrong, ending(self._path)
         stated = None if end.counts is None else sum(end.counts.values())
         if self._figures is not None:

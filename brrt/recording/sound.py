@@ -85,6 +85,8 @@ def _together(manifest: Manifest, world: World) -> None:
     for name, q in (("start", manifest.start), ("goal", manifest.goal)):
         if len(q) != manifest.dof:
             raise BrrtError(f"damaged: {name} has {len(q)} numbers, and not {manifest.dof}")
+        if not np.isfinite(q).all():
+            raise BrrtError(f"damaged: {name} is {q}")
     if not 0 <= manifest.epoch_ns <= LATEST_NS:
         raise BrrtError(f"damaged: it began {manifest.epoch_ns} ns after 1970")
     if manifest.dim != world.dim:
