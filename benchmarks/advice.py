@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from brrt import Memory, Recording, Run, Scenario, World
+from brrt import BranchedRun, Memory, Recording, Run, Scenario, World
 from brrt.replay.explain import Advice, explain
 
 SEEDS = 10
@@ -41,6 +41,21 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
     "walled-off goal": ({"iterations": 2000}, walled_off()),
     "tiny step": ({"world": "circles2d", "iterations": 2000, "params": {"step": 0.2}}, None),
     "small budget": ({"world": "maze2d", "iterations": 500}, None),
+    "few iterations": ({"world": "squares2d:n=120,seed=4", "iterations": 300}, None),
+    "few iterations, connect": ({"world": "squares2d:n=120,seed=4", "iterations": 100,
+                                 "planner": "rrt-connect"}, None),
+    "few iterations, arm": (
+        {"world": "circles2d:n=14,size=20,min_radius=0.5,max_radius=1,seed=3", "robot": "chain",
+         "start": (1.2, 0.5, -0.5), "goal": (-1.2, -0.5, 0.5), "planner": "rrt-connect",
+         "iterations": 50}, None,
+    ),
+    "body too wide": ({"world": "passage2d:gap=6", "robot": "polygon:length=8,width=7",
+                       "planner": "rrt-connect", "iterations": 2000}, None),
+    "body too wide, room": ({"world": "polygons2d:n=25", "iterations": 5000,
+                             "robot": "polygon:length=8,width=7"}, None),
+    "body that fits": ({"world": "passage2d:gap=9", "robot": "polygon:length=8,width=7",
+                        "iterations": 3000}, None),
+    "unseen gap 3D": ({"world": "gap3d:gap=1", "iterations": 20_000}, None),
     "no goal bias": ({"world": "empty2d", "params": {"goal_bias": 0, "step": 2},
                       "iterations": 1000}, None),
     "greedy bias": ({"world": "enclosure2d", "params": {"goal_bias": 0.9},
@@ -54,17 +69,27 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
     "star, gap": ({"world": "gap2d:gap=1", "planner": "rrt-star", "iterations": 3000}, None),
     "lrta, bug trap": ({"world": "bugtrap2d", "planner": "lrta-star",
                         "params": {"epsilon": 2}}, None),
+    "lrta, few iterations": ({"world": "bugtrap2d", "planner": "lrta-star",
+                              "iterations": 500}, None),
+    "a-star, few iterations": ({"world": "maze2d", "planner": "a-star", "iterations": 300}, None),
     "a-star, coarse cells": ({"world": "passage2d:gap=2", "planner": "a-star",
                               "params": {"epsilon": 7}}, None),
 }  # fmt: skip
 
 
-def run(scenario: Scenario, world: World | None) -> tuple[dict[str, Any], Recording]:
-    """Run a scenario; return its figures and the recording."""
-    made = Run(scenario, world=world)
+def run(made: Run) -> tuple[dict[str, Any], Recording]:
+    """Run; return the figures and the recording."""
     log = Memory()
     figures = made.execute([log]).as_dict()
     return figures, Recording(made.manifest, made.problem.world, lambda: iter(log.batches), None)
+
+
+def follow(advice: Advice, recording: Recording, world: World | None) -> dict[str, Any]:
+    """Do what is advised after a run; return the figures, those of the run's own start included."""
+    if advice.branch is not None:
+        return run(BranchedRun(recording, **advice.branch))[0]
+    assert advice.scenario is not None  # noqa: S101 - what only looks is not followed
+    return run(Run(advice.scenario, world=world))[0]
 
 
 def work(figures: dict[str, Any]) -> int:
@@ -86,24 +111,26 @@ def lines(case: str) -> Iterator[str]:
     before, after = [], defaultdict(list)
     for seed in range(SEEDS):
         scenario = Scenario(seed=seed, **values)
-        figures, recording = run(scenario, world)
+        figures, recording = run(Run(scenario, world=world))
         before.append(figures)
         for advice in explain(recording.at()).advice:
-            after[_changes(scenario, advice)].append((figures, advice.scenario))
+            after[_changes(scenario, advice)].append((figures, recording, advice))
     yield told(case, before)
     for changes, given in after.items():
-        plans = [(figures, plan) for figures, plan in given if plan is not None]
-        if not plans:
+        if given[0][2].suffix != ".mcap":
             yield f"   {changes}: {len(given)} times"
             continue
-        yield told("   where advised: " + changes[:18], [figures for figures, _ in plans])
-        yield told("   " + changes, [run(plan, world)[0] for _, plan in plans])
+        yield told("   where advised: " + changes[:18], [figures for figures, _, _ in given])
+        done = [follow(advice, recording, world) for _, recording, advice in given]
+        yield told("   " + changes, done)
 
 
 def _changes(scenario: Scenario, advice: Advice) -> str:
     """Name what a piece of advice changes."""
+    if advice.branch is not None:
+        return ", ".join([*advice.branch["settings"], *advice.branch["params"]]) + " (goes on)"
     if advice.scenario is None:
-        return advice.command.partition(" --")[0]
+        return " ".join(advice.words[:3])
     old, new = scenario.as_dict(), advice.scenario.as_dict()
     names = [name for name in new if name != "params" and new[name] != old[name]]
     names += [name for name in new["params"] if new["params"][name] != old["params"].get(name)]

@@ -10,6 +10,7 @@ from brrt import branch
 from brrt.branch import Recorded
 from brrt.events import Status
 from brrt.manifest import Branch, Manifest
+from brrt.replay.moment import check_limits
 from brrt.retrace import Anew, Onward, proved
 from brrt.run import Run, Solver, made_by
 from brrt.scenario import Scenario
@@ -61,6 +62,8 @@ class BranchedRun(_Again):
         batch: int = 8192,
         **until: int,
     ) -> None:
+        branch.check_recording(recording)
+        check_limits(until, "params", "seed", "settings", "batch")
         iteration, ended = branch.branching_point(recording, until)
         before = recording.manifest.ruling(iteration)
         scenario = branch.changed(before, params or {}, seed, settings or {})

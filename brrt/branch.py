@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Protocol
+from os import PathLike
+from typing import Any, Protocol, runtime_checkable
 
 from brrt.errors import BrrtError, unknown
 from brrt.events import Events, Kind, Phase, Status
@@ -17,6 +18,7 @@ _CHANGEABLE = ("iterations", "time", "smooth", "shortcuts", "execute", "max_move
 """What of a scenario may be another from a branch on, beside the planner's parameters."""
 
 
+@runtime_checkable
 class Recorded(Protocol):
     """A recording, as far as it matters here."""
 
@@ -123,6 +125,20 @@ def branching_point(recorded: Recorded, limits: Mapping[str, int]) -> tuple[int,
             "latest, and what follows planning is made anew"
         )
     return max(iteration, 0), status
+
+
+def check_recording(given: Any) -> None:
+    """See that what is to be gone on from is a recording.
+
+    Raises:
+        BrrtError: It is the name of one, or something else.
+    """
+    if isinstance(given, str | PathLike):
+        path = str(given)
+        raise BrrtError(f"a branch goes on from a recording: give brrt.read({path!r})")
+    if not isinstance(given, Recorded):
+        kind = type(given).__name__
+        raise BrrtError(f"a branch goes on from what brrt.read returns, not from {kind}")
 
 
 def check_open(

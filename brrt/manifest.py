@@ -33,6 +33,11 @@ class Branch:
     scenario: Scenario
     seed: int | None = None
 
+    @property
+    def origin(self) -> str:
+        """What it went on from, and where: a file's name as it was then."""
+        return f"{self.file or 'a run in memory'} at iteration {self.iteration:,}"
+
     def told(self, after: Scenario) -> str:
         """Say what is otherwise from here on, where another scenario rules."""
         before, now = ({**s.as_dict(), **s.settings()} for s in (self.scenario, after))
@@ -122,6 +127,15 @@ class Manifest:
         firsts = (0, *(branch.events for branch in self.branches))
         scenarios = (*(branch.scenario for branch in self.branches), self.scenario)
         return tuple(zip(firsts, scenarios, strict=True))
+
+    @property
+    def origins(self) -> tuple[str, ...]:
+        """From what the run went on, where, and what changed there; for each branch, in order."""
+        after = (scenario for _, scenario in self.stretches[1:])
+        return tuple(
+            f"{branch.origin}: {branch.told(scenario)}"
+            for branch, scenario in zip(self.branches, after, strict=True)
+        )
 
     def ruling(self, iteration: int) -> Self:
         """Return what it would be without the branches that came after an iteration."""

@@ -10,7 +10,7 @@ from brrt.events import Events, Kind, Phase, Status
 from brrt.manifest import Manifest
 from brrt.planners import PLANNERS
 from brrt.replay.diff import Deviation, Difference, first_difference
-from brrt.replay.side_by_side import parting, parting_as_dict
+from brrt.replay.parting import parting, parting_as_dict
 from brrt.replay.told import Row, rows_of
 from brrt.run import Run, made_by
 from brrt.worlds.world import World

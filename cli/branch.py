@@ -50,7 +50,7 @@ def go_on(
         run = BranchedRun(read(parent), params=params, seed=seed, settings=given, **limits)
     except BrokenError as error:
         raise RecordingError(
-            f"{error}; branch before that (--at-iteration), or save what is whole first: "
+            f"{error.fault}; branch before that (--at-iteration), or save what is whole first: "
             f"brrt recover {parent} --out whole.mcap"
         ) from None
     here = run.manifest.branches[-1]

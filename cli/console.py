@@ -78,12 +78,17 @@ def print_rows(
     out.print(table)
 
 
-def print_summary(figures: Mapping[str, Any]) -> None:
-    """Print a run's figures for people."""
+def print_summary(figures: Mapping[str, Any], branches: Iterable[str] = ()) -> None:
+    """Print a run's figures for people.
+
+    Args:
+        figures: What `Metrics.as_dict` returns.
+        branches: From what the run branched off, and what it changed there.
+    """
     outcomes = {"solved": "bold green", "not solved": "bold red"}
     print_pairs(
         (name, text, outcomes.get(text.split(",")[0], "") if name == "outcome" else "")
-        for name, text in _summary(figures)
+        for name, text in _summary(figures, branches)
     )
 
 
@@ -97,8 +102,10 @@ def print_pairs(rows: Iterable[tuple[str, str, str]]) -> None:
     out.print(table)
 
 
-def _summary(f: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _summary(f: Mapping[str, Any], branches: Iterable[str]) -> Iterator[tuple[str, str]]:
     yield "run", f"{f['planner']} · {f['robot']} · {f['world']} · seed {f['seed']}"
+    for branch in branches:
+        yield "branched", f"from {branch}"
     yield "outcome", _outcome(f)
     time = "" if f["plan_time_s"] is None else f" in {seconds(f['plan_time_s'])}"
     yield "planned", f"{counted(f['iterations'], 'iteration')}{time}"

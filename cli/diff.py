@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import Code, print_json, print_lines
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.recording import Recording
@@ -22,7 +22,8 @@ def diff(
 ) -> None:
     """Compare two runs: settings, versions, outcome, figures, and the first event that differs.
 
-    Times, versions and names of files do not count.
+    Times, versions and names of files do not count. The figures of a file that was cut are those up
+    to the cut, and it is said to be cut.
 
     Exit code 0: settings and events are equal; 1: something differs.
 
@@ -30,10 +31,9 @@ def diff(
 
     brrt diff run.mcap run.rrd --json
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
     from brrt.recording.versus import compare  # noqa: PLC0415
 
-    runs = (_saved(read(run), partial=partial) for run in (a, b))
+    runs = (_saved(opened(run, partial=partial), partial=partial) for run in (a, b))
     found = compare(*runs, names=(str(a), str(b)))
     if as_json:
         print_json(found.as_dict())

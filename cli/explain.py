@@ -1,14 +1,13 @@
 """`brrt explain`: why a run failed, or took long."""
 
 from pathlib import Path
-from textwrap import fill
 from typing import Annotated
 
 import typer
 
-from .console import note, out, print_json, print_pairs
+from .console import note, out, print_json, print_lines
 from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
-from .saved import Saved
+from .saved import Saved, opened
 
 
 def explain(
@@ -25,8 +24,9 @@ def explain(
 ) -> None:
     """Say why a run failed, or took long, by figures from its recording, and what to try.
 
-    Shares of the free space are counted in coarse cells, 16 x 16 or 8 x 8 x 8; widths are those
-    of the widest way from start to goal for a point, at its narrowest place, measured in cells.
+    Shares of the free space are counted in coarse cells, 16 x 16 or 8 x 8 x 8.
+    Widths are those of the widest way from start to goal, at its narrowest
+    place, measured in cells. Each command writes a file of its own, here.
 
     brrt explain run.mcap
 
@@ -34,24 +34,22 @@ def explain(
 
     brrt explain run.mcap --json
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
     from brrt.replay.explain import explain as explained  # noqa: PLC0415
     from brrt.replay.moment import Moment  # noqa: PLC0415
 
     limits = instant(at, at_event, at_iteration)
-    recording = read(run)
+    recording = opened(run, partial=partial)
     batches = Counted(Saved(recording, partial=partial, verb="explain them"))
     moment = Moment(recording.manifest, recording.world, lambda: iter(batches), limits)
-    found = explained(moment)
+    found = explained(moment, str(run))
     late = beyond(limits, batches.count, batches.last)
     if late is not None:
         note(f"{late}; this is how it stood then")
     if as_json:
         print_json(found.as_dict())
         return
-    print_pairs((name, text, "") for name, text in found.rows())
+    print_lines(found.table())
     for i, advice in enumerate(found.advice):
-        out.print()
-        why = fill(f"{i + 1}. {advice.why}", 78, subsequent_indent="   ")
-        out.print(why, markup=False)
-        out.print(f"   {advice.command}", style="bold", markup=False, soft_wrap=True)
+        print_lines(["", *advice.reason(i + 1)])
+        for line in advice.typed():
+            out.print(line, style="bold", markup=False, soft_wrap=True)

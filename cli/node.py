@@ -137,8 +137,8 @@ def _listed(name: str, lines: list[str]) -> Rows:
     for i, line in enumerate(shown):
         yield ("" if i else name), line
     if len(shown) < len(lines):
-        left = len(lines) - len(shown) - 1
-        yield "", f"... {left:,} more, the last: {lines[-1]}"
+        left = len(lines) - len(shown)
+        yield "", f"... {left:,} more, the last of these: {lines[-1]}"
 
 
 def _when(when: "When") -> str:

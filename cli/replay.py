@@ -1,5 +1,6 @@
 """`brrt replay`: a run's figures and trees, from its recording alone."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,14 +9,17 @@ import typer
 from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
 from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
 from .node import show_node, tree_number
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.events import Instant
     from brrt.recording import Recording
+    from brrt.replay.diff import Difference
     from brrt.replay.growth import TreeFigures
 
 _VERB = "replay them"
+_FEW = 3
+"""Events that are told ahead of the one that --check finds; `brrt diff` has more of them."""
 
 
 def replay(
@@ -59,9 +63,13 @@ def replay(
 ) -> None:
     """Rebuild the trees and the figures of a run from its recording.
 
+    With --at-event the event itself is told as well, and the ones ahead of it.
+
     brrt replay run.mcap
 
     brrt replay run.mcap --at 20ms
+
+    brrt replay run.mcap --at-event 403
 
     brrt replay run.mcap --text
 
@@ -71,56 +79,70 @@ def replay(
 
     brrt replay run.mcap --node 80 --at-iteration 400
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.account import Account  # noqa: PLC0415
+    from brrt.replay.diff import Newest  # noqa: PLC0415
     from brrt.replay.growth import Growth  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
     from brrt.replay.moment import feed  # noqa: PLC0415
+    from brrt.replay.parting import event_lines  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
     check_output(rrd, "--rrd", ".rrd", force=force)
-    if text and as_json:
-        raise BrrtError("give one of --text and --json")
-    if tree is not None and node is None:
-        raise BrrtError("--tree is that of a node; add --node NUMBER")
-    if node is not None and (text or check or rrd):
-        raise BrrtError("--node goes with --at, --tree and --json alone")
+    _check_together(
+        text_and_json=text and as_json,
+        lone_tree=tree is not None and node is None,
+        node_and_more=node is not None and bool(text or check or rrd),
+    )
     limits = instant(at, at_event, at_iteration)
     number = tree_number(tree)
-    recording = read(run)
+    recording = opened(run, partial=partial)
     if node is not None:
         _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
         return
     metrics = Metrics(recording.manifest)
     trees = Growth()
+    newest = [] if at_event is None else [Newest()]
     told = Account(recording.manifest, recording.robot()) if text else None
-    folds: list[Any] = [metrics, *filter(None, [told])] if as_json or text else [metrics, trees]
-    end = feed(Saved(recording, partial=partial, verb=_VERB), folds, limits)
+    folds: list[Any] = [told] if told else [] if as_json else [trees, *newest]
+    end = feed(Saved(recording, partial=partial, verb=_VERB), [metrics, *folds], limits)
     if end is not None:
         _note_end(limits, *end)
     if rrd is not None:
         _draw(recording, rrd, limits, partial=partial)
-    golden = None if check is None else read(check)
-    difference = None if golden is None else _difference(recording, golden, partial=partial)
+    golden = None if check is None else opened(check, partial=False)
+    first = None if golden is None else _difference(recording, golden, partial=partial)
     figures = metrics.as_dict()
     if as_json:
-        verdict = {} if check is None else {"check": {"equal": not difference, "first": difference}}
-        print_json({**figures, **verdict})
-        raise typer.Exit(Code.FAILED if difference else Code.DONE)
-    if told is None:
+        verdict = {"equal": first is None, "first": None if first is None else str(first)}
+        print_json(figures if check is None else {**figures, "check": verdict})
+    elif told is None:
         grown = trees.figures()  # where they are no trees, nothing is told of the run
-        print_summary(figures)
+        print_summary(figures, recording.manifest.origins)
         _show_trees(grown)
+        for each in newest:
+            print_lines(event_lines(each.before(each.next)))
     else:
         print_lines(told.lines())
-    if golden is not None:
-        seeds = [each.manifest.scenario.seed for each in (recording, golden)]
-        against = f"{run} (seed {seeds[0]}) and {check} (seed {seeds[1]})"
-        outcome = f"part at {difference}" if difference else "are equal, event by event"
-        out.print(f"{against} {outcome}", markup=False, soft_wrap=True)
-    raise typer.Exit(Code.FAILED if difference else Code.DONE)
+    if golden is not None and not as_json:
+        print_lines(_verdict((str(run), str(check)), (recording, golden), first))
+    raise typer.Exit(Code.FAILED if first is not None else Code.DONE)
+
+
+def _check_together(*, text_and_json: bool, lone_tree: bool, node_and_more: bool) -> None:
+    """See that the options go together.
+
+    Raises:
+        BrrtError: They do not.
+    """
+    from brrt.errors import BrrtError  # noqa: PLC0415
+
+    if text_and_json:
+        raise BrrtError("give one of --text and --json")
+    if lone_tree:
+        raise BrrtError("--tree is that of a node; add --node NUMBER")
+    if node_and_more:
+        raise BrrtError("--node goes with --at, --tree and --json alone")
 
 
 def _note_end(limits: dict[str, int], count: int, last: "Instant") -> None:
@@ -157,14 +179,40 @@ def _tell_of(
     _note_end(limits, batches.count, batches.last)
 
 
-def _difference(recording: "Recording", golden: "Recording", *, partial: bool) -> str | None:
+def _difference(
+    recording: "Recording", golden: "Recording", *, partial: bool
+) -> "Difference | None":
     from brrt.replay.diff import first_difference  # noqa: PLC0415
 
-    found = first_difference(
+    return first_difference(
         Saved(recording, partial=partial, verb=_VERB),
         Saved(golden, partial=False, verb=_VERB),
     )
-    return None if found is None else str(found)
+
+
+def _verdict(
+    names: tuple[str, str],
+    recordings: "tuple[Recording, Recording]",
+    first: "Difference | None",
+) -> Iterator[str]:
+    """Say whether a run is what another one was, and if not, where they part."""
+    from dataclasses import replace  # noqa: PLC0415
+
+    from brrt.replay.parting import parting  # noqa: PLC0415
+
+    a, b = (
+        f"{name} (seed {each.manifest.scenario.seed})"
+        for name, each in zip(names, recordings, strict=True)
+    )
+    yield ""
+    if first is None:
+        yield f"{a} and {b} are equal, event by event"
+        return
+    yield from (f"A  {a}", f"B  {b}")
+    few = replace(first, before=first.before[-_FEW:])
+    yield from parting(
+        few, ("A", "B"), (recordings[0].result is None, recordings[1].result is None)
+    )
 
 
 def _show_trees(trees: "list[TreeFigures]") -> None:

@@ -2,7 +2,9 @@
 
 import shlex
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .console import counted, note
@@ -29,6 +31,17 @@ def naming_runs(command: Callable[..., None]) -> Callable[..., None]:
     return named
 
 
+def opened(run: Path, *, partial: bool) -> "Recording":
+    """Open a recording; one that is not whole, and taken in part, lacks its run's end."""
+    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+
+    recording = read(run)
+    if not partial:
+        return recording
+    known = read(run, partial=True)
+    return replace(recording, result=known.result, counts=known.counts)
+
+
 class Saved:
     """Yields a recording's batches; where the file is cut or damaged, says what was saved.
 
@@ -53,7 +66,7 @@ class Saved:
                 last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
                 yield batch
         except BrokenError as error:
-            found = f"{error}; {told_of(self.events, last / 1e9, complete=error.complete)}"
+            found = f"{error.fault}; {told_of(self.events, last / 1e9, complete=error.complete)}"
             if not self._partial:
                 remedy = f"brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
                 what, them = (self._verb, "them") if self.events else ("take the problem", "it")

@@ -2,12 +2,13 @@
 
 import shlex
 from pathlib import Path
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import Code, Watch, note, out, print_json, print_lines, tell_of_compiling
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.recording import Recording
@@ -52,8 +53,9 @@ def verify(
 ) -> None:
     """Hold a recording to what its planner promises, by code that is not the planner's.
 
-    Exit code 0: every promise is kept; 1: one is broken. Whether draws are as even and as biased
-    as stated is judged by tests that wrong one sound recording in a million at most.
+    Exit code 0: every promise is kept; 1: one is broken. Whether draws are as
+    even and as biased as stated is judged by tests that wrong one sound
+    recording in a million at most.
 
     brrt verify run.mcap
 
@@ -63,18 +65,17 @@ def verify(
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.planners import PLANNERS  # noqa: PLC0415
-    from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.checks import examine  # noqa: PLC0415
 
     if tolerance is not None and (not rerun or not tolerance >= 0):
         raise BrrtError("--tolerance must be a number from 0 on, and goes with --rerun alone")
-    recording = read(run)
+    recording = opened(run, partial=partial)
     planner = recording.manifest.scenario.planner
     saved = Saved(recording, partial=partial, verb="verify them")
     # A file that brrt recover made breaks off too, though it is whole.
     tallies = examine(
         recording.manifest, recording.world, saved,
-        cut=lambda: saved.cut or recording.result is None,
+        cut=lambda: saved.cut or recording.result is None, figures=recording.result,
     )  # fmt: skip
     cut, events = saved.cut or recording.result is None, saved.events
     broken = sum(tally.broken for tally in tallies)
@@ -169,10 +170,10 @@ def _show(run: Path, tallies: "list[Tally]", *, long: bool) -> None:
         promise = "" if long or tally.broken else _short(tally.promise, _WIDTH - len(line) - 2)
         out.print(f"{line}  {promise}".rstrip(), style=_style(tally), markup=False, soft_wrap=True)
         if long or tally.broken:
-            out.print(f"  {tally.promise}", style="dim", markup=False, soft_wrap=True)
+            _tell(tally.promise, style="dim")
         for found in tally.findings[:_SHOWN]:
             where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
-            out.print(f"  {where}: {found.message}", markup=False, soft_wrap=True)
+            _tell(f"{where}: {found.message}")
         if tally.broken > _SHOWN:
             out.print(f"  ... and {tally.broken - _SHOWN:,} more")
         if tally.findings:
@@ -181,6 +182,13 @@ def _show(run: Path, tallies: "list[Tally]", *, long: bool) -> None:
     broken = sum(bool(tally.broken) for tally in looked)
     total = f"{len(looked)} rules, {broken} broken" if broken else f"all {len(looked)} rules hold"
     out.print(total, style="bold red" if broken else "bold green")
+
+
+def _tell(text: str, style: str = "") -> None:
+    """Print a sentence below its rule, no wider than a terminal."""
+    whole = TextWrapper(_WIDTH, "  ", "    ", break_long_words=False, break_on_hyphens=False)
+    for line in whole.wrap(text):
+        out.print(line, style=style, markup=False, soft_wrap=True)
 
 
 def _style(tally: "Tally") -> str:

@@ -10,7 +10,7 @@ import typer
 
 from .console import SIGNALLED, Watch, out
 from .instants import At, AtEvent, AtIteration, beyond, instant
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.events import Events
@@ -150,9 +150,7 @@ def _prepare(
 
     Behind them come files with more to show.
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
-
-    recordings = [read(run) for run in runs]
+    recordings = [opened(run, partial=partial) for run in runs]
     logs, cut = [], False
     for recording, run in zip(recordings, runs, strict=True):
         watch.update(0, f"reading {run.name}", "")

@@ -220,10 +220,19 @@ def test_what_cannot_be() -> None:
         "unknown parameter of planner rrt 'stp'": {"iteration": 3, "params": {"stp": 3}},
         "3 of 2 iterations are made; give more": {"iteration": 3, "settings": {"iterations": 2}},
         "s have passed of 1e-09; give more": {"iteration": 3, "settings": {"time": 1e-9}},
+        "unknown argument 'foo'": {"foo": 2},
+        "iteration must be a whole number from 0 on, not '7'": {"iteration": "7"},
     }
     for message, how in cases.items():
         with pytest.raises(BrrtError, match=message):
             BranchedRun(recording, **how)
+    wrong: Any
+    for wrong, message in (
+        ("run.mcap", r"give brrt\.read\('run\.mcap'\)"),
+        (log, "not from Events"),
+    ):
+        with pytest.raises(BrrtError, match=message):
+            BranchedRun(wrong)
     foreign = replace(recording.manifest, scenario=Scenario(planner="dogleg"))
     with pytest.raises(BrrtError, match="dogleg is not known here"):
         BranchedRun(replace(recording, manifest=foreign), iteration=3)
@@ -271,6 +280,8 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
     at = ("--from", "run.mcap", "--at-iteration", 20, "--param", "step=1")
     assert brrt("plan", *at, "--out", "small.mcap").code in {0, 1}
     assert "part at event" in brrt("replay", "small.mcap", "--check", "run.mcap").out
+    assert "from run.mcap at iteration 20: step 1, was auto" in brrt("replay", "small.mcap").out
+    assert "run.mcap at iteration 20" in brrt("diff", "small.mcap", "run.mcap").out
     assert brrt("verify", "small.mcap").code == 0
     assert "at iteration 20 of run.mcap: step" in brrt("replay", "small.mcap", "--text").out
     for message, options in {

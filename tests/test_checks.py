@@ -1,6 +1,7 @@
 """Clean runs keep every promise; each rule finds the log that was doctored against it."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
@@ -16,6 +17,7 @@ from brrt import Events, Kind, Manifest, McapSink, Memory, Run, Scenario, World,
 from brrt.events import Phase, Reason, Status, table_dtype
 from brrt.planners.contract import Contract, Near
 from brrt.replay.checks import RULES, examine
+from brrt.replay.metrics import Metrics
 
 from . import scenarios
 from .conftest import Result
@@ -33,10 +35,12 @@ class Evidence:
     world: World
     log: Events
     contract: Contract | None
+    figures: Mapping[str, Any] | None = None
 
     def broken(self) -> set[str]:
         """Names of the rules that find something."""
-        tallies = examine(self.manifest, self.world, self.log, self.contract)
+        case = self.manifest, self.world, self.log, self.contract
+        tallies = examine(*case, figures=self.figures)
         for tally in tallies:
             assert tally.broken >= len(tally.findings) > 0 or not tally.broken
             assert all(found.rule == tally.rule and found.message for found in tally.findings)
@@ -73,6 +77,14 @@ class Evidence:
         for table in tables.values():
             table["seq"][table["seq"] > gone] -= 1
         return replace(self, log=Events(self.log.dof, {k: t for k, t in tables.items() if len(t)}))
+
+    def state(self, name: str, value: Any) -> "Evidence":
+        """Put another figure down at the end."""
+        metrics = Metrics(self.manifest)
+        metrics.write(self.log)
+        figures = json.loads(json.dumps(metrics.as_dict()))
+        assert name in figures
+        return replace(self, figures={**figures, name: value})
 
     def with_ball(self, where: Any) -> "Evidence":
         """Put a tiny ball there."""
@@ -289,12 +301,17 @@ def shortcut_row(case: Evidence, accepted: bool) -> int:
 DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("numbering", "rrt", plus(Kind.PHASE, "seq", -1, 5), set()),
     ("times", "rrt", plus(Kind.EDGE, "t", 5, -5000), set()),
-    ("times", "rrt", plus(Kind.EDGE, "iteration", 5, -1000), {"budget"}),
+    ("times", "rrt", plus(Kind.EDGE, "iteration", 5, -1000), {"budget", "iterations"}),
     ("phases", "rrt", lambda c: c.drop(Kind.PHASE, -1), set()),
     ("phases", "rrt", lambda c: c.edit(Kind.PHASE, 1, status=Status.BEGIN), {"outcome"}),
     ("phases", "rrt", lambda c: c.edit(Kind.PHASE, 3, name=77), set()),
-    ("phases", "rrt", lambda c: c.drop(Kind.PHASE, 0), set()),
+    ("phases", "rrt", lambda c: c.drop(Kind.PHASE, 0), {"phase contents"}),
     ("names", "rrt", lambda c: c.edit(Kind.SAMPLE, 3, source=99), set()),
+    ("figures", "rrt", lambda c: c.state("path_cost", 1.0), set()),
+    ("figures", "rrt", lambda c: c.state("path_cost", None), set()),
+    ("figures", "rrt-star", lambda c: c.state("solved", False), set()),
+    ("figures", "lrta-star", lambda c: c.state("moves", 7), set()),
+    ("figures", "a-star", lambda c: c.state("path", [[0.0, 0.0]]), set()),
     ("outcome", "rrt", lambda c: c.edit(Kind.PHASE, 1, status=Status.ITERATION_LIMIT),
      {"endings"}),
     ("outcome", "march", lambda c: c.drop(Kind.PATH, 0), {"moves along path"}),
@@ -347,7 +364,7 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
         Kind.SHORTCUT, shortcut_row(c, accepted=True), accepted=False), {"shortcuts"}),
     ("moves", "march", plus(Kind.MOVE, "step", 7, 1), set()),
     ("moves", "walk", plus(Kind.MOVE, "trial", 0, 5),
-     {"move costs", "move lengths", "lattice moves", "choices"}),
+     {"move costs", "move lengths", "lattice moves", "choices", "paths walked"}),
     ("move costs", "march", plus(Kind.MOVE, "cost", -1, 1e-6), set()),
     ("move lengths", "march", lambda c: c.edit(
         Kind.MOVE, -1, q=c.log[Kind.MOVE]["q"][-2] + 5.0),
@@ -357,21 +374,22 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("moves along path", "march", lambda c: c.edit(
         Kind.PATH, 0, waypoints=c.log[Kind.PATH]["waypoints"][0][[0, 2]]), {"path costs"}),
     ("cells on lattice", "walk", lambda c: c.edit(
-        Kind.EXPAND, 3, q=c.log[Kind.EXPAND]["q"][3] + 0.1), set()),
+        Kind.EXPAND, 3, q=c.log[Kind.EXPAND]["q"][3] + 0.1), {"expansions"}),
     ("cells keep their numbers", "walk", plus(Kind.EXPAND, "cell", 3, 999), {"choices"}),
     ("cells keep their numbers", "walk", lambda c: c.edit(Kind.EXPAND, 3, cell=-3), {"choices"}),
     ("expansions", "walk", lambda c: c.edit(Kind.EXPAND, 3, parent=0), {"best first"}),
     ("expansions", "walk", plus(Kind.EXPAND, "cost", 3, 1.0), set()),
     ("estimates", "walk", falling_h, {"choices"}),
     ("estimates admissible", "walk", bad_h, {"choices"}),
-    ("lattice moves", "walk", lambda c: lattice_of(c, epsilon=5.0), {"choices"}),
-    ("choices", "walk", foolish, {"rejections"}),
+    ("lattice moves", "walk", lambda c: lattice_of(c, epsilon=5.0), {"choices", "neighbours"}),
+    ("choices", "walk", foolish, {"rejections", "neighbours", "limits"}),
     ("rejections", "rrt", lambda c: c.edit(
         Kind.REJECT, 0, node=0, q=c.log[Kind.EDGE]["q"][0] + 0.01), {"steering"}),
     ("rejections", "rrt", lambda c: c.edit(Kind.REJECT, 0, node=10**6), set()),
     ("rejections", "a-star", lambda c: c.edit(
-        Kind.REJECT, -1, node=0, q=c.log[Kind.EXPAND]["q"][0]), set()),
-    ("limits", "rrt", lambda c: c.edit(Kind.REJECT, 0, reason=Reason.LIMITS), set()),
+        Kind.REJECT, -1, node=0, q=c.log[Kind.EXPAND]["q"][0]), {"neighbours"}),
+    ("limits", "rrt", lambda c: c.edit(Kind.REJECT, 0, reason=Reason.LIMITS),
+     {"extensions", "reasons"}),
 ]  # fmt: skip
 
 
@@ -567,10 +585,11 @@ def test_doctored_logs_are_found(
 
 def test_every_rule_has_a_doctored_log() -> None:
     """Whoever adds a rule adds what it is for."""
-    from . import test_draws, test_growing, test_rewiring, test_searches
+    from . import test_acts, test_draws, test_growing, test_rewiring, test_searches
 
     names = {rule.__name__.replace("_", " ") for rule in RULES}
-    others = (t.DOCTORED for t in (test_draws, test_growing, test_rewiring, test_searches))
+    files = (test_acts, test_draws, test_growing, test_rewiring, test_searches)
+    others = (file.DOCTORED for file in files)
     assert names == {rule for rule, *_ in [*DOCTORED, *chain(*others)]}
     assert all((rule.__doc__ or "").strip() for rule in RULES)
 

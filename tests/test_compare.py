@@ -11,10 +11,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import Comparison, Events, Kind, Manifest, McapSink, Scenario, World, compare, read
+from brrt import (
+    BrrtError,
+    Comparison,
+    Events,
+    Kind,
+    Manifest,
+    McapSink,
+    Memory,
+    Metrics,
+    Recording,
+    Run,
+    Scenario,
+    World,
+    compare,
+    read,
+)
 from brrt.manifest import Branch
+from brrt.recording import CutError
 
 from .conftest import Result, recorded
+from .test_replay import cut
 
 SCENARIO = Scenario(world="circles2d:n=40,seed=3", seed=7, clock="logical")
 OTHER = replace(SCENARIO, params={"step": 1.5})
@@ -134,9 +151,18 @@ def test_defaults_names_and_versions_are_no_difference() -> None:
 def test_where_a_run_branched_is_a_setting() -> None:
     """A run that changed its settings on the way is another run."""
     manifest, world, log = live(SCENARIO)
-    turn = Branch("", "", 100, 300, SCENARIO, seed=4)
-    found = compare((manifest, world, log), (replace(manifest, branches=(turn,)), world, log))
-    assert found.settings == (("branches", "none", "100 with seed 4"),)
+    turn = Branch("", "p.mcap", 100, 300, SCENARIO, seed=4)
+    turned = replace(manifest, branches=(turn,))
+    found = compare((manifest, world, log), (turned, world, log))
+    assert found.settings == (("branched from", "none", "p.mcap at iteration 100"),)
+    moved = replace(manifest, branches=(replace(turn, file="elsewhere.mcap"),))
+    assert compare((turned, world, log), (moved, world, log)).equal
+    other = replace(manifest, branches=(replace(turn, seed=5),))
+    found = compare((turned, world, log), (other, world, log))
+    (row,) = found.settings
+    assert (row.a, row.b) == (
+        "p.mcap at iteration 100: draws from seed 4", "p.mcap at iteration 100: draws from seed 5"
+    )  # fmt: skip
 
 
 def test_paths_differ_by_a_waypoint() -> None:
@@ -162,19 +188,152 @@ def test_a_world_of_the_same_name_with_other_content() -> None:
     assert (row.name, row.b) == ("world balls", "1 of them other ones")
 
 
-def test_reads_no_further_than_needed() -> None:
-    """An early difference costs the first batch, and figures come from the end of the file."""
-    manifest, world, log = live(SCENARIO)
-    read_so_far = []
+def figures(run: Live, until: int | None = None) -> dict[str, Any]:
+    """Fold a run's events, or those up to a number."""
+    metrics = Metrics(run[0])
+    metrics.write(run[2].until(seq=until))
+    return metrics.as_dict()
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_reads_no_further_than_needed(*, known: bool) -> None:
+    """An early difference costs the first batch, if the figures stand at the end of the file."""
+    runs, read_so_far = (live(SCENARIO), live(OTHER)), []
 
     def batches(log: Events) -> Iterator[Events]:
-        for part in (log.until(seq=20), log):
+        for part in cut(log, 20):
             read_so_far.append(part)
             yield part
 
-    a, b = ((manifest, world, batches(each)) for each in (log, live(OTHER)[2]))
-    assert compare(a, b).first is not None
-    assert len(read_so_far) == 2
+    def opened(run: Live) -> Recording:
+        manifest, world, log = run
+        return Recording(manifest, world, lambda: batches(log), figures(run) if known else None)
+
+    found = compare(*map(opened, runs))
+    assert found.first is not None
+    assert found.figures == tuple(map(figures, runs))
+    assert len(read_so_far) == (2 if known else sum(len(cut(log, 20)) for _, _, log in runs))
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_figures_go_as_far_as_the_recording(data: st.DataObject) -> None:
+    """Wherever files are cut, and whatever they are compared with: the figures are never mixed."""
+    runs = [live(data.draw(st.sampled_from([SCENARIO, OTHER]))) for _ in range(2)]
+    ends = [data.draw(st.none() | st.integers(0, len(log) - 1)) for _, _, log in runs]
+
+    def opened(run: Live, end: int | None) -> Recording:
+        manifest, world, log = run
+        size = data.draw(st.integers(5, 200))
+        whole = None if end is not None else figures(run)
+        parts = cut(log.until(seq=end), size)
+        return Recording(manifest, world, lambda: iter(parts), whole, log.counts if whole else None)
+
+    found = compare(*map(opened, runs, ends))
+    for run, end, told, kinds, until in zip(
+        runs, ends, found.figures, found.events, found.cuts, strict=True
+    ):
+        part = run[2].until(seq=end)
+        assert told == figures(run, end)
+        assert {name: n for name, n in kinds.items() if n} == {
+            kind.label: n for kind, n in part.counts.items()
+        }
+        assert until == (None if end is None else (end + 1, part.last.t / 1e9))
+    text = str(found)
+    assert text.count("   cut behind event") == sum(end is not None for end in ends)
+    assert all(len(line) <= 80 for line in found.lines())
+    assert ("the run has ended" in text) is (
+        found.first is not None
+        and None in (found.first.left, found.first.right)
+        and ends[found.first.left is not None] is None
+    )
+
+
+def test_a_run_that_begins_like_another() -> None:
+    """A log that is the beginning of another is called so; a file that was cut, cut."""
+    manifest, world, log = live(SCENARIO)
+    n, short = len(log) // 2, log.until(seq=len(log) // 2)
+    told = compare((manifest, world, short), (manifest, world, log)).lines()
+    assert f"A is the beginning of B: B goes on after event {n:,}:" in told
+    assert f"A {n + 1:,}  the run has ended" in told
+    short_file = Recording(manifest, world, lambda: iter([short]), None)
+    told = compare((manifest, world, log), short_file).lines()
+    assert f"B is cut, and up to there equal to A: A goes on after event {n:,}:" in told
+    assert f"B {n + 1:,}  the recording is cut here" in told
+
+
+def test_what_a_planner_decides_is_told() -> None:
+    """Two defaults that come out as different steps are a difference; one that is given is none."""
+    star = replace(SCENARIO, planner="rrt-star")
+    rows = {row.name: row for row in compare(unplanned(SCENARIO), unplanned(star)).settings}
+    assert rows["param step"][1:] == ("auto: 5", "auto: 20")
+    assert rows["param gamma"].a is None
+    given_step = replace(SCENARIO, params={"step": 5.0})
+    assert not compare(unplanned(SCENARIO), unplanned(given_step)).settings
+    smaller = replace(SCENARIO, world="circles2d:n=40,seed=3,size=90")
+    rows = {row.name: row for row in compare(unplanned(SCENARIO), unplanned(smaller)).settings}
+    assert rows["param step"][1:] == ("auto: 5", "auto: 4.5")
+
+
+def test_values_that_are_long_stand_below_each_other() -> None:
+    """Each beside the letter of its run."""
+    manifest, world, log = live(SCENARIO)
+    name = "maps/" + "x" * 40
+    other = replace(manifest, scenario=replace(manifest.scenario, world=name))
+    told = [
+        " ".join(line.split())
+        for line in compare((manifest, world, log), (other, world, log)).lines()
+    ]
+    at = told.index(f"world A {manifest.scenario.world}")
+    assert told[at + 1] == f"B {name}"
+
+
+def test_moves_are_those_of_a_robot_that_moved() -> None:
+    """A path that nobody drove has motions."""
+    told = compare(live(SCENARIO), live(OTHER)).lines()
+    (motions,) = (line.split() for line in told if line.startswith("  motions"))
+    paths = [run[2][Kind.PATH]["waypoints"][-1] for run in (live(SCENARIO), live(OTHER))]
+    assert motions[1:3] == [str(len(path) - 1) for path in paths]
+    assert not any(line.startswith("  moves") for line in told)
+    driven = compare(live(replace(SCENARIO, execute=True)), live(SCENARIO)).lines()
+    assert any(line.startswith("  moves") for line in driven)
+
+
+def test_runs_in_memory_and_what_is_none() -> None:
+    """A run goes with its log; one without the other is refused in one line that says so."""
+    run, log = Run(replace(SCENARIO, iterations=50)), Memory()
+    run.execute([log])
+    own = (run.manifest, run.problem.world, log.events())
+    for other in ((run, log), (run, log.events()), (run, log.batches), own):
+        assert compare((run, log), other).equal
+    wrong: Any
+    for wrong in (run, log, log.events(), (run,), (run, run), (log, run), (run, "log"), 5, None):
+        with pytest.raises(BrrtError, match=r"\(run, log\)") as error:
+            compare(own, wrong)
+        assert "\n" not in str(error.value)
+
+
+def test_short_words_for_long_things(tmp_path: Path) -> None:
+    """What Python prints of a recording, an instant or a comparison fits a line or a screen."""
+    recording = read(filed(live(SCENARIO), tmp_path / "run.mcap"))
+    moment, found = recording.at(iteration=20), compare(recording, live(OTHER))
+    assert str(found).splitlines() == found.lines()
+    for each in (recording, moment, found):
+        assert len(repr(each)) < 120
+    assert "run.mcap" in repr(recording)
+    assert "iteration 20" in repr(moment)
+
+
+@pytest.mark.parametrize("kind", [".mcap", ".rrd"])
+def test_reading_a_cut_file_in_part(kind: str, tmp_path: Path) -> None:
+    """The error names the remedy, and that gives what is whole."""
+    path = filed(live(SCENARIO), tmp_path / f"run{kind}")
+    path.write_bytes(path.read_bytes()[:-300])
+    with pytest.raises(CutError, match=r"partial=True\) takes what is whole$"):
+        _ = read(path).at().events
+    part = read(path, partial=True)
+    assert part.result is None
+    assert compare(part, live(SCENARIO)).cuts[0] == (len(part.events()), part.events().last.t / 1e9)
 
 
 @pytest.mark.parametrize("kind", [".mcap", ".rrd"])
@@ -206,7 +365,7 @@ def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
     told = brrt("diff", a, b, "--json")
     assert told.code == 1
     assert told.json["first"]["seq"] == 3
-    assert told.json["settings"] == [{"name": "param step", "a": "auto", "b": 1.5}]
+    assert told.json["settings"] == [{"name": "param step", "a": "auto: 5", "b": 1.5}]
     for kind in told.json["events"].values():
         assert kind["a"] > 0
     missing = brrt("diff", a, "none.mcap")
@@ -217,16 +376,39 @@ def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
 def test_files_that_were_cut(brrt: Callable[..., Result], tmp_path: Path) -> None:
     """Where the difference lies ahead of the cut nothing is missing but the figures."""
     whole = filed(live(SCENARIO), tmp_path / "whole.mcap")
-    cut = tmp_path / "cut.mcap"
-    cut.write_bytes(whole.read_bytes()[:-100])
-    refused = brrt("diff", whole, cut)
+    broken = tmp_path / "cut.mcap"
+    broken.write_bytes(whole.read_bytes()[:-100])
+    refused = brrt("diff", whole, broken)
     assert refused.code == 2
     assert "--partial" in refused.err
-    assert brrt("diff", whole, cut, "--partial").code == 0
+    assert brrt("diff", whole, broken, "--partial").code == 0
+    # What is told of a file does not depend on what it is compared with, nor on how it was saved.
+    short = filed(
+        (*live(SCENARIO)[:2], live(SCENARIO)[2].until(seq=150)), tmp_path / "short.rrd", whole=False
+    )
+    assert brrt("recover", short, "--out", "saved.mcap").code == 0
     other = filed(live(OTHER), tmp_path / "other.mcap")
-    early = brrt("diff", other, cut)
+    for a, b in (
+        ("saved.mcap", other),
+        (other, "saved.mcap"),
+        ("saved.mcap", short),
+        (short, whole),
+    ):
+        done = brrt("diff", a, b, "--partial", "--json")
+        assert done.code == (b != short)
+        side = "b" if a == other else "a"
+        assert done.json["cut"][side]["events"] == 151
+        assert done.json["metrics"]["events"][side] == 151
+        assert sum(kind[side] for kind in done.json["events"].values()) == 151
+        assert (
+            done.json["metrics"]["iterations"][side] == figures(live(SCENARIO), 150)["iterations"]
+        )
+        assert brrt("diff", a, b, "--partial").out.count("   cut behind event 150 (") == 1 + (
+            b == short
+        )
+    early = brrt("diff", other, broken)
     assert early.code == 1
-    assert "cut: no result" in early.out
+    assert f"cut behind event {len(live(SCENARIO)[2]) - 1:,} (" in early.out
 
 
 def test_one_object_of_json_even_with_infinities() -> None:

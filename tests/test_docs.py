@@ -52,6 +52,9 @@ def test_readme_commands_and_code(
         # The two seeds of the tour are of one world: that the runs part is its point.
         parts = "--check" in args or args[0] == "diff"
         assert done.code == parts, (args, done.err)
+        if "--check" in args:
+            # What it prints stands below the command.
+            assert f"\n\n```\nA {done.out.partition(chr(10) * 2 + 'A ')[2]}```\n" in README
     assert [run.name for run in windows] == ["run.rrd"]
     for code in blocks("python"):
         if "def test_" in code:

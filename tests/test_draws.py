@@ -57,7 +57,9 @@ def log_of(n: int, doctor: Doctor | None = None, seed: int = 0) -> Evidence:
     tables = {Kind.PHASE: phases, Kind.SAMPLE: samples, Kind.EDGE: edges}
     for table in tables.values():
         table["t"] = table["seq"] * 1000
-    return Evidence(run.manifest, run.problem.world, Events(2, tables), None)
+    # What came of the draws is left out, so nothing is promised of that.
+    contract = replace(scenario.make_planner().contract(run.problem), growth=None)
+    return Evidence(run.manifest, run.problem.world, Events(2, tables), contract)
 
 
 def biased(chance: float) -> Doctor:
@@ -122,7 +124,9 @@ LIES: list[tuple[str, int, Doctor]] = [
 def test_lies_about_draws_are_found(rule: str, n: int, doctor: Doctor, seed: int) -> None:
     """By the rule that they break alone, at a draw and not only at the end of the log."""
     case = log_of(n, doctor, seed)
-    tallies = {t.rule: t for t in examine(case.manifest, case.world, case.log) if t.broken}
+    tallies = {
+        t.rule: t for t in examine(case.manifest, case.world, case.log, case.contract) if t.broken
+    }
     assert tallies.keys() == {rule}
     for found in tallies[rule].findings:
         assert found.seq == -1 or 2 <= found.seq < n + 2
@@ -134,7 +138,7 @@ def test_honest_draws_are_not_accused() -> None:
     case = log_of(100_000)
     batches = [case.log.until(seq=70_000), _after(case.log, 70_000)]
     for events in (case.log, batches):
-        tallies = examine(case.manifest, case.world, events)
+        tallies = examine(case.manifest, case.world, events, case.contract)
         assert not [tally.findings for tally in tallies if tally.broken]
         looked = {tally.rule: tally.examined for tally in tallies}
         assert looked["goal draws"] == 100_000
@@ -311,5 +315,5 @@ def test_bounds_of_any_size(low: float, wide: float, seed: int) -> None:
         case.manifest, scenario=scenario, start=tuple(lower.tolist()), goal=tuple(upper.tolist())
     )
     events = Events(2, {**case.log.tables, Kind.SAMPLE: samples})
-    tallies = {t.rule: t for t in examine(manifest, world, events)}
+    tallies = {t.rule: t for t in examine(manifest, world, events, case.contract)}
     assert not tallies["even draws"].broken, tallies["even draws"].findings

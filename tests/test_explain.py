@@ -1,8 +1,10 @@
 """Why a run failed: each figure against the log, and advice that can be followed."""
 
 import json
+import re
 import shlex
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import Kind, Memory, Recording, Run, Scenario, World, read
+from brrt import Kind, Memory, Polygon, Recording, Run, Scenario, World, make_world, read
 from brrt.events import Reason, Source, table_dtype
-from brrt.replay.explain import Explanation, explain
-from brrt.replay.explain.gather import FAILED, Spans, Thinned
+from brrt.manifest import Manifest
+from brrt.replay.explain import Advice, Explanation, explain
+from brrt.replay.explain.gather import FAILED, Gather, Spans, Thinned
+from brrt.replay.explain.way import Ways
 
 from . import toys
 from .conftest import Result, recorded
@@ -135,7 +139,7 @@ def test_what_is_in_the_way_is_named() -> None:
     found = explained(GAP).facts
     assert [each.name.split(" (")[0] for each in found.blockers] == ["box 0", "box 1"]
     assert sum(each.share for each in found.blockers) == pytest.approx(1)
-    assert found.connected
+    assert found.way.connected
     assert found.narrow is not None
     assert found.narrow.low <= 5 <= found.narrow.high
     tree_goes_through = found.narrow.behind > 0
@@ -183,9 +187,17 @@ CASES: dict[str, tuple[list[str], str]] = {
                "goal_bias=0.05"),
     "bug trap": (["--world", "bugtrap2d", "--iterations", "2000", "--seed", "3"],
                  "--planner rrt-connect"),
+    "few iterations": (["--world", "squares2d:n=120,seed=4", "--seed", "7", "--iterations", "300"],
+                       "--from run.mcap --iterations 30000"),
     "coarse cells": (["--world", "passage2d:gap=3", "--planner", "a-star", "--param", "epsilon=7"],
                      "epsilon="),
 }  # fmt: skip
+
+
+def commands(text: str) -> list[list[str]]:
+    """The commands on a screen, as a shell takes them: what stands behind `brrt`."""
+    lines = text.replace("\\\n", "").splitlines()
+    return [shlex.split(line)[1:] for line in lines if line.startswith("   brrt ")]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -195,10 +207,51 @@ def test_what_is_advised_first_helps(case: str, brrt: Command) -> None:
     assert brrt("plan", *args, "--out", "run.mcap").code == 1
     done = brrt("explain", "run.mcap")
     assert (done.code, done.err) == (0, "")
-    line = next(each for each in done.out.splitlines() if each.startswith("   brrt "))
-    assert change in line
-    assert brrt(*shlex.split(line)[1:]).code == 0
-    assert read(Path("next.mcap")).at().best_path is not None
+    words = commands(done.out)[0]
+    assert change in " ".join(words)
+    assert brrt(*words).code == 0
+    assert read(Path("run-1.mcap")).at().best_path is not None
+
+
+BODY = "polygon:length=8,width=7"
+
+
+@pytest.mark.parametrize(
+    "world", [["--world", "passage2d:gap=6"], ["--world", "polygons2d:n=25"]], ids=["gap", "room"]
+)
+def test_a_body_that_is_too_wide_is_told(world: list[str], brrt: Command) -> None:
+    """No advice to search on, or otherwise: a look at the picture."""
+    brrt("plan", *world, "--robot", BODY, "--iterations", 1500, "--out", "run.mcap")
+    found = brrt("explain", "run.mcap", "--json").json
+    assert found["body"] == pytest.approx(7)
+    assert found["widest"] < 7
+    (advice,) = found["advice"]
+    assert "no pose of this body fits through: it is at least 7 wide, the widest" in advice["why"]
+    assert advice["command"] == "brrt plot run.mcap --out run-1.png"
+
+
+@settings(max_examples=6)
+@given(st.sampled_from([7.1, 7.6, 9]), st.floats(-3, 3), st.floats(-3, 3))
+def test_a_body_that_gets_through_is_not_too_wide(gap: float, dx: float, dy: float) -> None:
+    """Wherever its reference point lies: what was solved is never told to be too narrow."""
+    body = np.add([[-4, -3.5], [4, -3.5], [4, 3.5], [-4, 3.5]], [dx, dy])
+    robot = Polygon(parts=(body, body[:3] / 2))
+    world = make_world(f"passage2d:gap={gap}")
+    start, goal = np.array([12.0, 50.0, 0]), np.array([88.0, 50.0, 0])
+    middle = float(world.boxes[:, 1].max() - gap / 2)
+    way = np.array([start, [12, middle - dy, 0], [88, middle - dy, 0], goal])
+    free = all(
+        robot.collision(world, q) is None
+        for a, b in pairwise(way)
+        for q in robot.interpolate(a, b, np.linspace(0, 1, 40))
+    )
+    ends = tuple(start.tolist()), tuple(goal.tolist())
+    gather = Gather(Manifest(Scenario(), *ends, dim=2, dof=3, epoch_ns=0, made_by={}), robot)
+    found = Ways(world, robot, gather).find(start, goal, 5.0)
+    assert found.body == pytest.approx(7)
+    assert free
+    assert not found.too_narrow
+    assert found.connected
 
 
 def test_a_walled_off_goal_needs_a_look(brrt: Command) -> None:
@@ -209,7 +262,7 @@ def test_a_walled_off_goal_needs_a_look(brrt: Command) -> None:
     brrt("plan", "--world", "walled.json", "--iterations", 500, "--out", "run.mcap")
     found = brrt("explain", "run.mcap", "--json").json
     assert [each["command"] for each in found["advice"]] == ["brrt worlds show walled.json"]
-    assert "no way is to be seen" in found["advice"][0]["why"]
+    assert "there is no way from start to goal" in found["advice"][0]["why"]
 
 
 def test_what_improves_no_more_is_said(brrt: Command) -> None:
@@ -223,14 +276,15 @@ def test_what_improves_no_more_is_said(brrt: Command) -> None:
 
 
 def test_it_fits_a_screen(brrt: Command) -> None:
-    """80 columns, commands aside, and about 24 lines."""
+    """80 columns, and about 24 lines; from Python it is the same text."""
     for args in (["--world", "gap2d:gap=1", "--iterations", 2000],
                  ["--planner", "lrta-star", "--world", "bugtrap2d", "--param", "epsilon=3"],
                  ["--planner", "rrt-star", "--iterations", 2000]):  # fmt: skip
         brrt("plan", *args, "--out", "run.mcap", "--force")
-        lines = brrt("explain", "run.mcap").out.splitlines()
-        assert all(len(line) <= 80 or line.startswith("   brrt ") for line in lines)
-        assert len(lines) <= 30
+        text = brrt("explain", "run.mcap").out
+        assert all(len(line) <= 80 for line in text.splitlines())
+        assert len(text.splitlines()) <= 33
+        assert text == str(explain(read(Path("run.mcap")).at())) + "\n"
 
 
 @pytest.mark.parametrize(
@@ -243,3 +297,114 @@ def test_bad_input_is_one_line(args: list[Any], message: str, brrt: Command) -> 
     done = brrt("explain", *args)
     assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
     assert message in done.err
+
+
+def test_each_advice_writes_a_file_of_its_own(brrt: Command) -> None:
+    """Pasted one after the other, and then what is advised on the first: nothing is in the way."""
+    brrt("plan", "--world", "gap2d:gap=1", "--iterations", 1200, "--out", "run.mcap")
+    words = commands(brrt("explain", "run.mcap").out)
+    assert len(words) > 1
+    for each in words:
+        assert brrt(*each).code in (0, 1)
+    names = {"run.mcap", *(f"run-{i + 1}.mcap" for i in range(len(words)))}
+    assert {path.name for path in Path().glob("*.mcap")} == names
+    text = brrt("explain", "run-1.mcap", "--json").json["advice"]
+    assert all("--out run-1-" in each["command"] for each in text)
+
+
+def test_a_passage_that_nothing_came_near_is_not_blamed(brrt: Command) -> None:
+    """What had hardly begun goes on: the first advice, and the only one."""
+    brrt("plan", *CASES["few iterations"][0], "--out", "run.mcap")
+    done = brrt("explain", "run.mcap").out
+    assert "none came within" in " ".join(done.split())
+    assert len(commands(done)) == 1
+
+
+def test_a_branch_is_advised_to_branch(brrt: Command) -> None:
+    """From itself, for all that a branch can change; and it names its parent."""
+    few, tiny = (CASES[name][0] for name in ("few iterations", "tiny step"))
+    brrt("plan", *few, "--out", "few.mcap")
+    brrt("plan", "--from", "few.mcap", "--at-iteration", 100, "--seed", 5, "--out", "branch.mcap")
+    done = brrt("explain", "branch.mcap").out
+    assert "few.mcap, behind iteration 100: draws from seed 5" in done
+    (words,) = commands(done)
+    assert words[:4] == ["plan", "--from", "branch.mcap", "--iterations"]
+    assert brrt(*words).code == 0
+
+    brrt("plan", *tiny, "--out", "tiny.mcap")
+    brrt("plan", "--from", "tiny.mcap", "--at-iteration", 300, "--param", "step=0.3",
+         "--out", "branch.mcap", "--force")  # fmt: skip
+    words = commands(brrt("explain", "branch.mcap").out)[0]
+    assert words[:5] == ["plan", "--from", "branch.mcap", "--at-iteration", "300"]
+    assert brrt(*words, "--force").code == 0
+
+
+def test_a_run_that_was_cut_goes_on(brrt: Command) -> None:
+    """From the cut file itself, where it breaks off; an instant of a whole one is no cut."""
+    brrt("plan", "--world", "gap2d:gap=0.2", "--iterations", 9000, "--out", "run.mcap")
+    whole = Path("run.mcap").read_bytes()
+    Path("cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    done = brrt("explain", "cut.mcap", "--partial").out
+    assert "cut short, not solved: the recording breaks off after" in " ".join(done.split())
+    assert brrt(*commands(done)[0]).code == 1
+    figures = [brrt("replay", name, "--json").json for name in ("run.mcap", "cut-1.mcap")]
+    assert figures[0]["nodes"] == figures[1]["nodes"]
+    early = brrt("explain", "run.mcap", "--at-iteration", 500).out
+    assert "not solved yet after 500 iterations" in early
+    assert "breaks off" not in early
+
+
+def test_a_solved_run_is_told_as_one(brrt: Command) -> None:
+    """Two trees meet in the passage: the path leads through, and nobody is said to be outside."""
+    brrt("plan", "--world", "passage2d:gap=0.3", "--planner", "rrt-connect", "--out", "run.mcap")
+    done = brrt("explain", "run.mcap").out
+    assert "the path leads through there" in " ".join(done.split())
+    assert "got through" not in done
+    assert "nearest" not in done
+
+
+def test_cells_too_coarse_to_tell_send_nobody_to_the_map(brrt: Command) -> None:
+    """A hole in a wall that no cell fits: a longer search may find it."""
+    brrt("plan", "--world", "gap3d:gap=1", "--iterations", 3000, "--out", "run.mcap")
+    found = brrt("explain", "run.mcap", "--json").json
+    assert found["connected"] is None
+    assert 1 <= found["widest"] < 7
+    assert found["advice"][0]["command"].startswith("brrt plan --from run.mcap --iterations ")
+    assert "too coarse to show one" in found["advice"][0]["why"]
+
+
+def test_a_search_on_a_lattice_ends_with_its_cells(brrt: Command) -> None:
+    """So many iterations decide it."""
+    brrt("plan", "--world", "maze2d:size=30", "--planner", "a-star", "--iterations", 100,
+         "--out", "run.mcap")  # fmt: skip
+    words = commands(brrt("explain", "run.mcap").out)[0]
+    assert words[:5] == ["plan", "--from", "run.mcap", "--iterations", "3721"]
+    assert brrt(*words).code == 0
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(st.text("ab 'x=,/", min_size=1, max_size=30), min_size=1, max_size=9),
+    st.integers(0, 3),
+)
+def test_a_folded_command_is_the_command(values: list[str], flags: int) -> None:
+    """A shell reads the lines as the words; each fits a screen if its words do."""
+    words = ["brrt", "plan", *(f"--flag{i}" for i in range(flags))]
+    words += [part for i, value in enumerate(values) for part in (f"--option{i}", value)]
+    lines = Advice("why", tuple(words)).typed()
+    assert shlex.split("\n".join(lines).replace("\\\n", "")) == words
+    assert all(len(line) <= 79 for line in lines)
+    assert all(line.endswith(" \\") for line in lines[:-1])
+
+
+def test_events_left_out_add_up(brrt: Command) -> None:
+    """Of many rejections four are listed and the last: with the others they are all."""
+    brrt("plan", "--world", "gap2d:gap=1", "--iterations", 500, "--out", "run.mcap")
+    node = int(np.bincount(read(Path("run.mcap")).events()[Kind.REJECT]["node"]).argmax())
+    done = brrt("replay", "run.mcap", "--node", node).out
+    told = re.search(r"(\d+) extensions? from it", done)
+    more = re.search(r"\.\.\. (\d+) more, the last of these:", done)
+    assert told is not None
+    assert more is not None
+    listed = re.findall(r"^ +event ", done, re.MULTILINE)
+    assert int(told[1]) == len(listed) + int(more[1])

@@ -73,14 +73,14 @@ DOCTORED: list[tuple[str, Callable[[], Evidence], set[str]]] = [
     ("steering", lambda: evidence("rrt-star").edit(Kind.SAMPLE, 20, q=[50.0, 90.0]), set()),
     ("steering", lambda: evidence("rrt-connect").edit(Kind.SAMPLE, 3, q=[50.0, 90.0]), set()),
     ("steering", lambda: evidence("bi-rrt-star").edit(Kind.SAMPLE, 9, q=[50.0, 90.0]), set()),
-    ("steering", lambda: growing(slices=2)(evidence("rrt")), set()),
+    ("steering", lambda: growing(slices=2)(evidence("rrt")), {"extensions"}),
     ("goal tries", lambda: promise(line_of_sight=True)(evidence("rrt")), set()),
     ("link tries", lambda: growing(links="extend")(evidence("rrt-connect")), set()),
     ("link tries", lambda: growing(links="connect")(evidence("bi-rrt")), set()),
     ("link tries", lambda: growing(connects=True)(evidence("rrt-connect")), set()),
     ("link tries", lambda: growing(always_links=True)(evidence("rrt-connect")), set()),
     ("link tries", lambda: overlooked(1, BIT)(evidence("rrt-connect")), set()),
-    ("link tries", lambda: overlooked(1, BIT)(evidence("bi-rrt-star")), set()),
+    ("link tries", lambda: overlooked(1, BIT)(evidence("bi-rrt-star")), {"extensions"}),
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from brrt import Events, Kind, McapSink, RecordingError, Scenario, first_difference, read
+from brrt import Events, Kind, McapSink, RecordingError, Scenario, compare, first_difference, read
 from brrt.recording.container import MAGIC
 from brrt.recording.mcap_records import SEAL
 from brrt.recording.recover import recover
@@ -88,6 +88,7 @@ class Forger:
         attach: str = "world.json",
         twice: bool = False,
         events: int | None = None,
+        late: bool = False,
     ) -> Path:
         """Write it.
 
@@ -96,11 +97,13 @@ class Forger:
             attach: Name of the world's attachment.
             twice: Divide the messages of each topic between two channels.
             events: So many the figures speak of, if there are to be figures.
+            late: Write the manifest behind the messages.
         """
         with self.path.open("wb") as file:
             out = Writer(file, index_types=self.index, compression=self.compression)
             out.start("ros2", "forger")
-            out.add_metadata("brrt.run", self.run)
+            if not late:
+                out.add_metadata("brrt.run", self.run)
             out.add_attachment(0, 0, attach, "application/json", self.world)
             if attach != "world.json":
                 out.add_attachment(0, 0, "world.json", "application/json", self.world)
@@ -117,6 +120,8 @@ class Forger:
                 )  # fmt: skip
             if events is not None:
                 out.add_metadata("brrt.result", {"events": str(events)})
+            if late:
+                out.add_metadata("brrt.run", self.run)
             out.finish()
         return self.path
 
@@ -133,6 +138,17 @@ def test_written_anew_by_stock_mcap(tmp_path: Path) -> None:
         forger = Forger(tmp_path / "x.mcap", index)
         log = write(tmp_path / "true.mcap")
         assert first_difference([log], read(forger.forge()).batches()) is None
+    # It has no figures, but its run has come to its end: nobody cut it.
+    found = compare(Forger(tmp_path / "x.mcap").forge(), tmp_path / "true.mcap")
+    assert found.equal
+    assert found.cuts == (None, None)
+
+
+def test_a_manifest_that_stands_behind(forger: Forger) -> None:
+    """The error says what is to stand where, and what to do."""
+    said = told(forger.forge(late=True))
+    assert "metadata brrt.run and behind it attachment world.json must stand ahead" in said
+    assert "read the file that it was made of" in said
 
 
 SCHEMAS: dict[str, tuple[Callable[[str], str], str]] = {

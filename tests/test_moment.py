@@ -1,5 +1,6 @@
 """Travel in time: a run at any instant, and the history of a node, against a slow twin."""
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -104,7 +105,7 @@ def test_no_more_is_read_than_is_needed() -> None:
 @pytest.mark.parametrize(
     "wrong",
     [{"time": -1}, {"time": float("nan")}, {"event": 1.5}, {"iteration": -1}, {"time": 1e30},
-     {"time": 1, "event": 1}],
+     {"time": 1, "event": 1}, {"time": "1ms"}, {"event": True}, {"iteration": [3]}],
 )  # fmt: skip
 def test_an_instant_that_is_none(wrong: dict[str, Any]) -> None:
     """It is refused before anything is read."""
@@ -253,6 +254,26 @@ def test_node_on_the_command_line(brrt: Command) -> None:
     assert late.err.startswith("brrt: the recording ends at")
     brrt("plan", "--planner", "lrta-star", "--world", "empty2d:size=5", "--out", "b.mcap")
     assert "estimate" in brrt("replay", "b.mcap", "--node", 0).out
+
+
+def test_the_event_of_an_instant_is_told(brrt: Command) -> None:
+    """The event itself to its last digit, and the ten at most ahead of it; within 80 columns."""
+    brrt("plan", "--planner", "rrt-star", "--iterations", 200, "--out", "a.mcap")
+    log = read(Path("a.mcap")).events()
+    chosen = [int(log[kind]["seq"][-1]) for kind in (Kind.EDGE, Kind.REWIRE, Kind.PHASE)]
+    for seq in (0, 4, *chosen):
+        told = brrt("replay", "a.mcap", "--at-event", seq).out.split(f"event {seq:,}")[1]
+        told = told.partition(":")[2]
+        numbers = [
+            int(n) for n in re.findall(r"^ +(\d+)  [a-z]", told.replace(",", ""), re.MULTILINE)
+        ]
+        assert numbers == list(range(max(0, seq - 9), seq + 1))
+        assert max(map(len, told.splitlines())) <= 80
+    q = log[Kind.EDGE]["q"][-1].tolist()
+    told = " ".join(brrt("replay", "a.mcap", "--at-event", chosen[0]).out.split())
+    assert all(repr(x) in told for x in q)
+    late = brrt("replay", "a.mcap", "--at-event", len(log) + 5)
+    assert f"event {len(log) - 1:,}, and those" in late.out
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from brrt import Grid, World, make_world
-from brrt.worlds.passage import clearance, narrowest
+from brrt import BrrtError, Grid, World, make_world
+from brrt.worlds.convex import convex_polygon, inscribed
+from brrt.worlds.passage import clearance, narrowest, widest
+from brrt.worlds.raster import Lattice
+from brrt.worlds.shapes import shapes_of
+from brrt.worlds.survey import covered
 
 SHAPES = st.sampled_from([(5, 7), (9, 4), (3, 4, 5)])
 FREE = SHAPES.flatmap(lambda shape: arrays(np.bool_, shape))
@@ -107,3 +111,66 @@ def test_no_way_is_none() -> None:
     boxes = np.array([[4, 4, 9, 5], [4, 8, 9, 9], [4, 4, 5, 9], [8, 4, 9, 9]], float)
     world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=boxes)
     assert narrowest(world, np.array([1.0, 1.0]), np.array([6.5, 6.5])) is None
+    assert widest(world, np.array([1.0, 1.0]), np.array([6.5, 6.5]), 1 << 12, 1.0) == 0
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10**6))
+def test_what_no_disc_gets_through_is_proven(seed: int) -> None:
+    """On a grid map: no way is wider than the bound, and no way at all where it is 0."""
+    rng = np.random.default_rng(seed)
+    free = rng.random((24, 30)) > 0.12
+    ends = rng.permutation(np.argwhere(free))[:2]
+    start, goal = (np.array([column + 0.5, row + 0.5]) for row, column in ends)
+    bound = widest(World.of_grid("map", Grid(~free, np.zeros(2), 1.0)), start, goal, 1 << 13, 9.0)
+    square = clearance(free.T, np.ones(2), 32)
+    least = _widest(square, *(tuple(np.floor(end).astype(int)) for end in (start, goal)))
+    # From middle to middle there is as much room, but for half of each cell and of the way.
+    assert least == 0 or bound >= max(1e-9, 2 * (np.sqrt(least) - np.sqrt(0.5) - 0.5))
+    assert least > 0 or bound < 0.5  # walls that meet in a corner may be thinner than a cell
+
+
+@pytest.mark.parametrize(("gap", "bound"), [(0.5, 2.1), (3.7, 5.3), (6.0, 7.6), (9.0, np.inf)])
+def test_the_bound_is_near_to_the_width(gap: float, bound: float) -> None:
+    """Within four cells of what is known; beyond what is asked for there is none."""
+    world = make_world(f"passage2d:gap={gap}")
+    assert world.start is not None
+    assert world.goal is not None
+    assert gap <= widest(world, world.start, world.goal, 1 << 16, 8.0) <= bound
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10**6))
+def test_what_is_filled_is_not_free(seed: int) -> None:
+    """Any point of a cell that an obstacle fills touches one; whole boxes are found filled."""
+    rng = np.random.default_rng(seed)
+    world = make_world(f"polygons2d:n=6,size=20,seed={seed % 100}")
+    lattice = Lattice.over(world.lower, world.upper, 900)
+    cells = np.argwhere(lattice.filled(shapes_of(world)))
+    assert not lattice.filled(shapes_of(world))[~lattice.blocked(shapes_of(world))].any()
+    points = lattice.lower + (cells + rng.random(cells.shape)) * lattice.cell
+    assert not len(points) or covered(world, points).all()
+    box = World(
+        "box", np.zeros(3), np.full(3, 8.0), boxes=np.array([[1.5, 1.5, 1.5, 5.5, 4.5, 4.5]])
+    )
+    assert Lattice.over(box.lower, box.upper, 512).filled(shapes_of(box)).sum() == 3 * 2 * 2
+
+
+@settings(max_examples=40)
+@given(st.integers(3, 40), st.floats(0.05, 20), st.integers(0, 10**6))
+def test_the_inscribed_disc_is_within(corners: int, flat: float, seed: int) -> None:
+    """It touches three edges at least and crosses none; that of a rectangle is as wide as it."""
+    angles = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, corners))
+    ring = np.stack([np.cos(angles), flat * np.sin(angles)], axis=1)
+    try:
+        polygon = convex_polygon("ring", ring)
+    except BrrtError:
+        return
+    middle, radius = inscribed(polygon)
+    around = np.linspace(0, 2 * np.pi, 64)
+    disc = middle + radius * np.stack([np.cos(around), np.sin(around)], axis=1)
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    to = disc[:, None] - polygon
+    assert (edges[:, 0] * to[..., 1] - edges[:, 1] * to[..., 0] >= -1e-7).all()
+    sides = np.array([[-1, -flat], [1, -flat], [1, flat], [-1, flat]]) / 2
+    assert inscribed(sides)[1] == pytest.approx(min(1, flat) / 2)

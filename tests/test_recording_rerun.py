@@ -430,7 +430,7 @@ def test_newer_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A recording of a newer brrt says so."""
     path = tmp_path / "run.rrd"
     write(path, SCENARIOS["unsolved"])
-    monkeypatch.setattr("brrt.scenario.Manifest.FORMAT", "0")
+    monkeypatch.setattr("brrt.manifest.Manifest.FORMAT", "0")
     with pytest.raises(RecordingError, match=r"run\.rrd: recording format '1' .* update brrt"):
         read(path)
 

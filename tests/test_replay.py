@@ -137,8 +137,8 @@ def test_an_end_is_a_difference() -> None:
     assert one is not None
     assert two is not None
     assert (one.seq, two.seq) == (41, 41)
-    assert "the second run has ended" in str(one)
-    assert "the first run has ended" in str(two)
+    assert "the second log has ended" in str(one)
+    assert "the first log has ended" in str(two)
     assert first_difference([], []) is None
 
 

@@ -138,7 +138,7 @@ def test_disk_that_fills_up(threaded: bool, tmp_path: Path) -> None:
     events, error = saved(path)
     assert isinstance(error, CutError)
     assert path.stat().st_size < 20_000
-    assert str(error) == f"{path}: the file is cut at byte {path.stat().st_size:,}"
+    assert error.fault == f"{path}: the file is cut at byte {path.stat().st_size:,}"
     assert 0 < len(events) < len(log)
     assert begins(log, events)
 
@@ -390,6 +390,7 @@ def test_damaged_file_names_remedies(ending: str, brrt: Command, tmp_path: Path)
     path = tmp_path / f"run{ending}"
     log = write(path)
     data = path.read_bytes()
+    assert read(path, partial=True).result == read(path).result
     for place, least, most in ((len(data) // 2, 1, len(log) - 1), (-40, len(log), len(log))):
         damaged = bytearray(data)
         damaged[place] ^= 8
@@ -399,6 +400,9 @@ def test_damaged_file_names_remedies(ending: str, brrt: Command, tmp_path: Path)
             assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
             assert " with --partial, or save them with brrt recover run" in done.err
             assert ("no event is lost" in done.err) == (most == len(log))
+        taken = read(path, partial=True)
+        assert taken.result is None
+        assert least <= len(taken.events()) <= most
         assert brrt("verify", path.name, "--partial").code == 0
         done = brrt("replay", path.name, "--partial", "--json")
         assert (done.code, done.err.count("\n")) == (0, 1)

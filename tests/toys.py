@@ -193,10 +193,10 @@ class Walk:
                     if free(problem, here, place(other)):
                         choices.append((self.epsilon + estimate(other), other))
                     elif cell not in looked:
-                        log.emit(
-                            Kind.REJECT, moves, tree=0, node=number, reason=Reason.COLLISION,
-                            q=place(other),
-                        )  # fmt: skip
+                        q, world = place(other), problem.world
+                        beyond = ((q < world.lower) | (world.upper < q)).any()
+                        reason = Reason.LIMITS if beyond else Reason.COLLISION
+                        log.emit(Kind.REJECT, moves, tree=0, node=number, reason=reason, q=q)
                 looked.add(cell)
                 if not arrives:
                     best, cell_next = min(choices)
@@ -215,9 +215,7 @@ class Walk:
                 if log.room < 20:
                     yield log.drain()
             if (path[-1] == goal).all():
-                stage = Stage.IMPROVED if trial else Stage.RAW
-                if stage is Stage.RAW:
-                    log.emit(Kind.PATH, moves, stage=stage, cost=cost, waypoints=np.array(path))
+                log.emit(Kind.PATH, moves, stage=Stage.RAW, cost=cost, waypoints=np.array(path))
             else:
                 status = Status.ITERATION_LIMIT
         log.emit(Kind.PHASE, moves, name=Phase.PLAN, status=status)

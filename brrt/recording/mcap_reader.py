@@ -56,15 +56,30 @@ def read_mcap(path: Path) -> Recording:
                     return Recording(manifest, world, batches, end.result, end.counts)
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
-    raise RecordingError(f"{path}: an MCAP file, but not a recording of brrt (no {RUN} in front)")
+    raise RecordingError(
+        f"{path}: an MCAP file, but not a recording of brrt, or one that another tool rewrote: "
+        f"metadata {RUN} and behind it attachment {WORLD} must stand ahead of the first chunk; "
+        "read the file that it was made of, or have the tool write them first"
+    )
+
+
+def is_whole(path: Path) -> bool:
+    """Whether the checksums of data and summary are right; the events are not looked at."""
+    try:
+        with opened(path) as file:
+            for _ in records_of(path, file):
+                pass
+            check_summary(path, file)
+    except RecordingError:
+        return False
+    return True
 
 
 def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     try:
         yield from records_of(path, file)
     except CutError as error:
-        why = f"{error.why}, ahead of the first event: there is nothing to save"
-        raise CutError(path, why) from None
+        raise error.in_front() from None
 
 
 def _batches(path: Path, manifest: Manifest, texts: Mapping[str, str]) -> Iterator[Events]:

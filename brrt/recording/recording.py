@@ -9,12 +9,12 @@ from brrt.manifest import Manifest
 from brrt.replay.account import account
 from brrt.replay.checks import Finding, check
 from brrt.replay.metrics import Metrics
-from brrt.replay.moment import Moment, instant
+from brrt.replay.moment import Moment, check_limits, instant
 from brrt.robots import Robot
 from brrt.worlds.world import World
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Recording:
     """A recording on disk; its events are read anew by each call of `batches`.
 
@@ -33,6 +33,14 @@ class Recording:
     result: Mapping[str, Any] | None
     counts: Mapping[Kind, int] | None = None
     name: str = ""
+
+    def __repr__(self) -> str:
+        scenario, result = self.manifest.scenario, self.result
+        end = "no figures at its end"
+        if result is not None:
+            end = f"{result.get('events')} events, {result.get('status')}"
+        run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"
+        return f"<Recording {self.name or 'in memory'}: {run}; {end}>"
 
     def events(self) -> Events:
         """Return the whole log at once."""
@@ -58,7 +66,7 @@ class Recording:
             BrrtError: More than one is given, or it is no number from 0 on.
         """
         limits = instant(time=time, event=event, iteration=iteration)
-        return Moment(self.manifest, self.world, self.batches, limits)
+        return Moment(self.manifest, self.world, self.batches, limits, self.name)
 
     def robot(self) -> Robot:
         """Make the robot as it was, settled in the world."""
@@ -120,10 +128,11 @@ class Recording:
         from brrt.pictures.figure import plot  # noqa: PLC0415 - matplotlib is an extra
         from brrt.pictures.history import Record  # noqa: PLC0415
 
+        check_limits(until, "ax", "what", "rejects")
         events = self.events().until(**until)
         record = Record(self.manifest.scenario.planner, self.manifest, self.world, events)
         return plot(record, ax, what=what, rejects=rejects)
 
     def check(self) -> list[Finding]:
         """Hold the run to what its planner promises; return what it breaks."""
-        return check(self.manifest, self.world, self.events())
+        return check(self.manifest, self.world, self.events(), figures=self.result)

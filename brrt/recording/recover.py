@@ -91,7 +91,7 @@ def _copy(recording: Recording, sink: Any) -> Recovery:
         try:
             batch = next(batches, None)
         except BrokenError as error:
-            return Recovery(count, last / 1e9, str(error), error.complete, error.ended)
+            return Recovery(count, last / 1e9, error.fault, error.complete, error.ended)
         if batch is None:
             return Recovery(count, last / 1e9, None, True, recording.result is not None)
         sink.write(batch)

@@ -81,8 +81,7 @@ class Outline:
         if outline.stopped is not None:
             del outline.places[outline.sound :]
             if not outline.checked:
-                why = f"{outline.stopped.why}, ahead of the first event: there is nothing to save"
-                raise type(outline.stopped)(path, why)
+                raise outline.stopped.in_front()
         return outline
 
     def _read(self, file: IO[bytes]) -> None:

@@ -27,18 +27,37 @@ class BrokenError(RecordingError):
         why: What is wrong with it.
         complete: Whether no event is missing: what is wrong stands behind or beside them.
         ended: Whether, besides, the run came to its own end, so that its figures follow from them.
+        remedy: What to do in Python, if anything; on the command line it is another one.
     """
 
     def __init__(
-        self, path: Path, why: str, *, complete: bool = False, ended: bool = False
+        self,
+        path: Path,
+        why: str,
+        *,
+        complete: bool = False,
+        ended: bool = False,
+        remedy: str = "",
     ) -> None:
-        super().__init__(f"{path}: {why}")
         self.path, self.why = path, why
         self.complete, self.ended = complete, ended
+        super().__init__("; ".join(filter(None, (self.fault, remedy))))
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with which file, without a remedy."""
+        return f"{self.path}: {self.why}"
 
     def judged(self, *, complete: bool, ended: bool) -> Self:
         """Return it with what is known once all that can be read has been."""
-        return type(self)(self.path, self.why, complete=complete, ended=complete and ended)
+        remedy = "brrt.read(path, partial=True) takes what is whole"
+        ended = complete and ended
+        return type(self)(self.path, self.why, complete=complete, ended=ended, remedy=remedy)
+
+    def in_front(self) -> Self:
+        """Return it for a file of which nothing is of use."""
+        why = f"{self.why}, ahead of the first event: there is nothing to save"
+        return type(self)(self.path, why)
 
 
 class CutError(BrokenError):

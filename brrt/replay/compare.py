@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
+from brrt.errors import RecordingError
 from brrt.events import Events, Kind
 from brrt.manifest import Manifest
 from brrt.replay.diff import Deviation, Difference, first_difference
@@ -27,6 +28,10 @@ _COUNTED = {
 }  # fmt: skip
 
 
+_NEEDED = ("solved", "status", "iterations", "events")
+"""Figures without which an end of a recording says too little."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
     """One of two runs.
@@ -35,9 +40,11 @@ class Side:
         name: What it is called.
         manifest: Its manifest.
         world: Its world.
-        batches: Its events, in order; read no further than needed.
+        batches: Its events, in order; where the figures are known, read no further than needed.
         result: The figures that its writer found; None where it did not get to the end.
         counts: Events of each kind, as its writer counted them; None where it is not known.
+        cut: Whether it is a recording without figures: it ends ahead of its run's end, unless it
+            has counts and its last phase has ended, as what other programs write.
     """
 
     name: str
@@ -46,9 +53,22 @@ class Side:
     batches: Iterable[Events]
     result: Mapping[str, Any] | None = None
     counts: Mapping[Kind, int] | None = None
+    cut: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+class Cut(NamedTuple):
+    """How far a recording goes that ends ahead of its run's end.
+
+    Attributes:
+        events: How many it has.
+        until_s: When the last of them happened, in seconds of the run.
+    """
+
+    events: int
+    until_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison:
     """What two runs have in common and what not; a is the first run, b the second.
 
@@ -57,7 +77,9 @@ class Comparison:
         settings: The settings that differ: of the scenario, the planner with its defaults, the
             robot, the query and the world's content.
         notes: What differs and is no difference of the runs: a file's name, versions, platform.
-        figures: Status and metrics of each; empty where a file has no end.
+        cuts: How far each goes whose recording ends ahead of its run's end, so that its figures
+            and counts go as far as that; None where it does not.
+        figures: Status and metrics of each.
         timed: Whether the clocks of both were real; otherwise times mean nothing.
         events: Events by kind of each, as far as they are known.
         tolerance: How far apart numbers may be; see `brrt.replay.diff.Deviation`.
@@ -67,6 +89,7 @@ class Comparison:
     names: tuple[str, str]
     settings: tuple[Row, ...]
     notes: tuple[Row, ...]
+    cuts: tuple[Cut | None, Cut | None]
     figures: tuple[Mapping[str, Any], Mapping[str, Any]]
     timed: bool
     events: tuple[Mapping[str, int], Mapping[str, int]]
@@ -84,6 +107,16 @@ class Comparison:
 
         return lines(self)
 
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def __repr__(self) -> str:
+        a, b = (name or letter for name, letter in zip(self.names, "AB", strict=True))
+        parts = [f"{len(self.settings)} settings differ"] if self.settings else []
+        if self.first is not None:
+            parts.append(f"events part at {self.first.seq:,}")
+        return f"<Comparison of {a} and {b}: {', '.join(parts) or 'equal'}>"
+
     def as_dict(self) -> dict[str, Any]:
         """Return it as `brrt diff --json` prints it."""
         from brrt.replay.side_by_side import as_dict  # noqa: PLC0415 - it imports this module
@@ -92,13 +125,23 @@ class Comparison:
 
 
 def compare_sides(a: Side, b: Side, tolerance: float = 0.0) -> Comparison:
-    """Compare two runs; their events are read up to the first difference, and no further."""
+    """Compare two runs.
+
+    Their events are read up to the first difference, and no further unless a run's figures stand
+    nowhere else: those are never of another part of the run than the counts beside them.
+
+    Raises:
+        RecordingError: A recording is cut or damaged ahead of the first difference.
+    """
     readers = _Reader(a), _Reader(b)
     first = first_difference(*readers, Deviation(allowed=tolerance))
+    for reader in readers:
+        reader.finish()
     return Comparison(
         (a.name, b.name),
         tuple(settings_of(a.manifest, a.world, b.manifest, b.world)),
         tuple(versions_of(a.manifest, b.manifest)),
+        (readers[0].cut(), readers[1].cut()),
         (readers[0].figures(), readers[1].figures()),
         all(side.manifest.scenario.clock == "real" for side in (a, b)),
         (readers[0].counts(), readers[1].counts()),
@@ -112,14 +155,34 @@ class _Reader:
 
     def __init__(self, side: Side) -> None:
         self._side = side
+        self._batches = iter(side.batches)
         self._metrics = Metrics(side.manifest)
-        self._ended = False
+        self._last_t = 0
+        self._cut, self._ended = side.cut, False
 
     def __iter__(self) -> Iterator[Events]:
-        for batch in self._side.batches:
+        for batch in self._batches:
             self._metrics.write(batch)
+            self._last_t = max(self._last_t, batch.last.t)
             yield batch
         self._ended = True
+
+    def finish(self) -> None:
+        """Read the rest for the figures, where the end of the recording does not have them."""
+        if self._ended or (not self._side.cut and set(_NEEDED) <= (self._side.result or {}).keys()):
+            return
+        try:
+            for _ in self:
+                pass
+        except RecordingError:
+            # Behind the first difference it takes nothing from that: the figures end here.
+            self._cut = self._ended = True
+
+    def cut(self) -> Cut | None:
+        """Return how far the recording goes, where it ends ahead of its run's end."""
+        if not self._cut or (self._side.counts is not None and not self._metrics.breaks_off):
+            return None
+        return Cut(sum(self._metrics.counts.values()), self._last_t / 1e9)
 
     def figures(self) -> Mapping[str, Any]:
         """Return the run's figures: its own fold where it was read to its end."""

@@ -62,7 +62,7 @@ class Difference:
         if left is None or right is None:
             which, other = ("first", right) if left is None else ("second", left)
             return (
-                f"event {self.seq}: the {which} run has ended; the other has {_text(other or {})}"
+                f"event {self.seq}: the {which} log has ended; the other has {_text(other or {})}"
             )
         if left["kind"] != right["kind"]:
             return f"event {self.seq}: {_text(left)} against {_text(right)}"
@@ -86,14 +86,14 @@ def first_difference(
             takes in how far apart they were.
     """
     deviation = Deviation() if deviation is None else deviation
-    recent = _Recent(left)
-    a_batches, b_batches = iter(recent), iter(right)
+    newest = Newest()
+    a_batches, b_batches = newest.taking(left), iter(right)
     a, b = next(a_batches, None), next(b_batches, None)
     while a is not None and b is not None:
         end = min(_end(a), _end(b))
         found = _compare(a.until(seq=end - 1), b.until(seq=end - 1), deviation)
         if found is not None:
-            return replace(found, before=recent.before(found.seq))
+            return replace(found, before=newest.before(found.seq))
         a, b = _rest(a, end, a_batches), _rest(b, end, b_batches)
     rest = a if a is not None else b
     if rest is None:
@@ -101,22 +101,31 @@ def first_difference(
     seq, _ = rest.kinds_in_order()
     event = event_at(rest, seq)
     ours, theirs = (event, None) if a is not None else (None, event)
-    return Difference(seq, ours, theirs, recent.before(seq))
+    return Difference(seq, ours, theirs, newest.before(seq))
 
 
-class _Recent:
-    """Hands on a log's batches, and keeps those that hold its newest events."""
+class Newest:
+    """Keeps those of a log's batches that hold its newest events."""
 
-    def __init__(self, batches: Iterable[Events]) -> None:
-        self._batches = batches
+    def __init__(self) -> None:
         self._kept: deque[Events] = deque()
 
-    def __iter__(self) -> Iterator[Events]:
-        for batch in self._batches:
-            self._kept.append(batch)
-            while sum(map(len, self._kept)) - len(self._kept[0]) >= len(batch) + BEFORE:
-                self._kept.popleft()
+    def taking(self, batches: Iterable[Events]) -> Iterator[Events]:
+        """Hand on batches, and take them in."""
+        for batch in batches:
+            self.write(batch)
             yield batch
+
+    def write(self, events: Events) -> None:
+        """Take in a batch."""
+        self._kept.append(events)
+        while sum(map(len, self._kept)) - len(self._kept[0]) >= len(events) + BEFORE:
+            self._kept.popleft()
+
+    @property
+    def next(self) -> int:
+        """The number behind the newest event."""
+        return max(map(_end, self._kept), default=0)
 
     def before(self, seq: int) -> tuple[dict[str, Any], ...]:
         """Return the events right ahead of a number that was not handed on long ago."""

@@ -106,6 +106,11 @@ class Metrics:
         ended = self._ended.get(Phase.PLAN)
         return "running" if ended is None else ended[1].name.lower().replace("_", " ")
 
+    @property
+    def breaks_off(self) -> bool:
+        """Whether the log ends within a phase, or ahead of the first."""
+        return not self._began or not self._began.keys() <= self._ended.keys()
+
     def _seconds(self, phase: Phase) -> float | None:
         """How long a phase took, up to the last event if it did not end; None if it never began."""
         if phase not in self._began:

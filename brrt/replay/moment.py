@@ -1,11 +1,13 @@
 """A run as it stood at an instant: trees, figures, paths, nodes, each folded when asked for."""
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from numbers import Real
+from typing import Any, Protocol
 
-from brrt.errors import BrrtError
+from brrt.errors import BrrtError, unknown
 from brrt.events import Events, Instant, Kind
 from brrt.manifest import Manifest
 from brrt.replay.cells import CellHistory, CellTrace
@@ -61,19 +63,44 @@ def instant(
     Raises:
         BrrtError: More than one is given, or it is no number from 0 on.
     """
-    given = {"time": time, "event": event, "iteration": iteration}
+    given: dict[str, Any] = {"time": time, "event": event, "iteration": iteration}
     chosen = {name: value for name, value in given.items() if value is not None}
     if len(chosen) > 1:
         raise BrrtError(f"give one of time, event and iteration, not {' and '.join(chosen)}")
     for name, value in chosen.items():
-        if not 0 <= value < _FOREVER or (name != "time" and value != int(value)):
+        if not _counts(value) or not value < _FOREVER or (name != "time" and value != int(value)):
             what = "seconds from 0 on" if name == "time" else "a whole number from 0 on"
-            raise BrrtError(f"{name} must be {what}, not {value!r}")
+            raise BrrtError(f"{name} must be {what}, not {value!r:.60}")
     if time is not None:
         return {"t": round(time * 1e9)}
     return {"seq" if name == "event" else name: int(value) for name, value in chosen.items()}
 
 
+def check_limits(limits: Mapping[str, Any], *others: str) -> None:
+    """See that an instant is given as `Events.until` takes it.
+
+    Args:
+        limits: The instant, or what was given for one.
+        others: Names of arguments that there are beside it, for the message.
+
+    Raises:
+        BrrtError: A name is none of an instant, or a value no whole number from 0 on.
+    """
+    for name, value in limits.items():
+        if name not in _COLUMNS:
+            raise unknown("argument", name, (*others, *_COLUMNS))
+        if value is not None and not (_counts(value) and value == int(value)):
+            raise BrrtError(f"{name} must be a whole number from 0 on, not {value!r:.60}")
+
+
+def _counts(value: Any) -> bool:
+    """Whether it is a number from 0 on, and finite."""
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    return number and bool(0 <= value < math.inf)
+
+
+_COLUMNS = ("iteration", "seq", "t")
+_LIMITS = {"seq": "event", "iteration": "iteration"}
 _FOREVER = 9e9
 """Longer than any run, in seconds; its nanoseconds fit into 64 bits. And more than any count."""
 
@@ -100,7 +127,7 @@ class Structure:
         return forest(Events.concat(self._dof, self._batches))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Moment:
     """A run as it stood at an instant; what is not asked for is not read.
 
@@ -109,12 +136,23 @@ class Moment:
         world: Where it took place.
         batches: Call it for the whole log.
         limits: The instant, as `Events.until` takes it; the end where it is empty.
+        name: The recording's file; empty where there is none.
     """
 
     manifest: Manifest
     world: World
     batches: Callable[[], Iterator[Events]]
     limits: Mapping[str, int]
+    name: str = ""
+
+    def __repr__(self) -> str:
+        scenario = self.manifest.scenario
+        instant = ", ".join(
+            f"after {value / 1e9:g} s" if name == "t" else f"after {_LIMITS[name]} {value:,}"
+            for name, value in self.limits.items()
+        )
+        run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"
+        return f"<Moment of {run}: {instant or 'its end'}>"
 
     @cached_property
     def events(self) -> Events:

@@ -1,17 +1,13 @@
 """A comparison in plain text, on one screen of 80 columns, and as JSON."""
 
-import math
 import shlex
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
-from brrt.replay.compare import METRICS, TIMES, Comparison
-from brrt.replay.diff import Difference, same
+from brrt.replay.compare import METRICS, TIMES, Comparison, Cut
+from brrt.replay.parting import WIDTH, apart, fit, parting, parting_as_dict
 from brrt.replay.told import Row
 
-WIDTH = 80
 _NAME, _VALUE = 22, 20
 """Columns of a name and of a run's value; what is left is for the change."""
 
@@ -25,9 +21,11 @@ def lines(found: Comparison) -> list[str]:
 
 
 def _lines(found: Comparison) -> Iterator[str]:
-    for letter, name in zip("AB", found.names, strict=True):
-        if name:
-            yield _fit(f"{letter}  {name}")
+    for letter, name, cut in zip("AB", found.names, found.cuts, strict=True):
+        if name or cut is not None:
+            yield fit(f"{letter}  {name}")
+        if cut is not None:
+            yield fit(f"   {_cut(cut)}")
     yield from _rows("settings", found.settings, "the same")
     if found.notes:
         yield from _rows("besides", found.notes, "")
@@ -38,6 +36,14 @@ def _lines(found: Comparison) -> Iterator[str]:
     yield from _parting(found)
 
 
+def _cut(cut: Cut) -> str:
+    if not cut.events:
+        return "cut ahead of its first event"
+    return (
+        f"cut behind event {cut.events - 1:,} ({cut.until_s:.6f} s): its figures go as far as that"
+    )
+
+
 def _rows(title: str, rows: tuple[Row, ...], none: str) -> Iterator[str]:
     """Tell what differs; values that are long stand one above the other."""
     if not rows:
@@ -45,12 +51,12 @@ def _rows(title: str, rows: tuple[Row, ...], none: str) -> Iterator[str]:
         return
     yield _row(title, "A", "B")
     for row in rows[:_MOST_ROWS]:
-        a, b = _apart(row.a, row.b)
+        a, b = apart(row.a, row.b)
         if max(len(a), len(b)) < _VALUE:
             yield _row(f"  {row.name}", a, b)
         else:
-            yield _fit(f"  {row.name:{_NAME - 2}}{a}")
-            yield _fit(f"{'':{_NAME}}{b}")
+            yield fit(f"  {row.name:{_NAME - 2}} A  {a}")
+            yield fit(f"{'':{_NAME}} B  {b}")
     if len(rows) > _MOST_ROWS:
         yield f"  ... and {len(rows) - _MOST_ROWS} more: --json has them"
 
@@ -58,18 +64,42 @@ def _rows(title: str, rows: tuple[Row, ...], none: str) -> Iterator[str]:
 def _outcome(found: Comparison) -> Iterator[str]:
     """Tell how the runs ended, and their figures."""
     a, b = found.figures
-    yield _row("outcome", _outcome_of(a), _outcome_of(b))
-    ends = [each.get("status", "solved") for each in (a, b)]
+    outcomes = ("solved" if each.get("solved") else "not solved" for each in (a, b))
+    yield _row("outcome", *outcomes)
+    ends = [str(each.get("status")) for each in (a, b)]
     if ends != ["solved", "solved"]:
-        yield _row("  ended by", *ends)
-    names = METRICS + TIMES if found.timed else METRICS
-    for name in names:
+        by = ("running when cut" if cut and end == "running" else end
+              for end, cut in zip(ends, found.cuts, strict=True))  # fmt: skip
+        yield _row("  ended by", *by)
+    a, b = _motions(a), _motions(b)
+    for name in _figures(found):
         x, y = a.get(name), b.get(name)
         if x is not None or y is not None:
             in_time = name in TIMES
-            p, q = (_seconds(x), _seconds(y)) if in_time else _apart(x, y)
+            p, q = (_seconds(x), _seconds(y)) if in_time else apart(x, y)
             said = name.removesuffix("_s").replace("_", " ")
             yield _row(f"  {said}", p, q, _change(x, y))
+
+
+def _figures(found: Comparison) -> Iterator[str]:
+    """Yield the figures that are told, in order."""
+    for name in METRICS:
+        yield name
+        if name == "iterations":
+            yield "motions"
+    if found.timed:
+        yield from TIMES
+
+
+def _motions(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return figures in which moves are those of a robot that moved, with the path's motions."""
+    moved = figures.get("max_move_time_s") is not None
+    path = figures.get("smoothed_path") or figures.get("path")
+    return {
+        **figures,
+        "moves": figures.get("moves") if moved else None,
+        "motions": len(path) - 1 if path else None,
+    }
 
 
 def _events(found: Comparison) -> Iterator[str]:
@@ -92,69 +122,22 @@ def _parting(found: Comparison) -> Iterator[str]:
     first = found.first
     if first is None:
         how = f"numbers within {found.tolerance:g}" if found.tolerance else "to the last bit"
-        but = "; the settings alone differ" if found.settings else ""
-        yield f"The events are equal, {how}, but for the times{but}."
+        yield f"The events are equal, {how}, but for the times."
+        if found.settings:
+            yield "The settings alone differ."
         return
-    yield from parting(first, ("A", "B"))
+    yield from parting(first, ("A", "B"), (found.cuts[0] is not None, found.cuts[1] is not None))
     if all(found.names):
         a, b = (shlex.quote(name) for name in found.names)
+        partial = " --partial" if any(found.cuts) else ""
         yield ""
-        yield f"brrt view {a} {b}"
-        yield f"brrt replay {a} --at-event {first.seq}"
-
-
-def parting(first: Difference, names: tuple[str, str]) -> Iterator[str]:
-    """Tell the first event that differs in two runs, and the ones ahead of it.
-
-    Args:
-        first: The event.
-        names: What the runs are called; the shorter, the more there is to see.
-    """
-    seq, digits, margin = first.seq, len(f"{first.seq:,}"), max(map(len, names))
-    yield f"They part at event {seq:,}; ahead of it:" if seq else "They part at their first event:"
-    for event in first.before:
-        yield _fit(f"{'':{margin}} {event['seq']:>{digits},}  {_event(event)}")
-    marked = first.fields
-    for name, theirs in zip(names, (first.left, first.right), strict=True):
-        text = "the run has ended" if theirs is None else _event(theirs, marked)
-        yield _fit(f"{name:{margin}} {seq:>{digits},}  {text}")
-    for name in marked:
-        values = [(theirs or {})[name] for theirs in (first.left, first.right)]
-        where, (a, b) = _unlike(*values) if name == "waypoints" else (name, values)
-        yield _fit(f"{'':{margin}} {'':{digits}}  {where}: {' against '.join(_apart(a, b))}")
-
-
-def _unlike(a: Any, b: Any) -> tuple[str, tuple[Any, Any]]:
-    """Return the first waypoint that is another in two paths, or how many they have."""
-    if len(a) != len(b):
-        return "waypoints", (len(a), len(b))
-    at = next(i for i, (p, q) in enumerate(zip(a, b, strict=True)) if not same(p, q))
-    return f"waypoint {at}", (a[at], b[at])
-
-
-def _event(event: Mapping[str, Any], marked: Collection[str] = ()) -> str:
-    """Tell an event in one line; a star marks the fields that differ."""
-    parts = [f"{event['kind']:9}"]
-    for name, value in event.items():
-        if name not in ("seq", "kind"):
-            short = {"iteration": "it"}.get(name, name)
-            parts.append(f"{'*' if name in marked else ''}{short} {_text(value, 5)}")
-    return " ".join(parts)
+        yield f"brrt view {a} {b}{partial}"
+        # A run that has ended has no such event.
+        yield f"brrt replay {b if first.left is None else a} --at-event {first.seq}"
 
 
 def _row(name: str, a: str, b: str, change: str = "") -> str:
-    return _fit(f"{name:{_NAME}}{a:>{_VALUE}}{b:>{_VALUE}}{change:>{WIDTH - _NAME - 2 * _VALUE}}")
-
-
-def _fit(line: str) -> str:
-    line = line.rstrip()
-    return line if len(line) <= WIDTH else line[: WIDTH - 4] + " ..."
-
-
-def _outcome_of(figures: Mapping[str, Any]) -> str:
-    if not figures:
-        return "cut: no result"
-    return "solved" if figures["solved"] else "not solved"
+    return fit(f"{name:{_NAME}}{a:>{_VALUE}}{b:>{_VALUE}}{change:>{WIDTH - _NAME - 2 * _VALUE}}")
 
 
 def _seconds(value: float | None) -> str:
@@ -182,26 +165,6 @@ def _change(a: Any, b: Any) -> str:
     return f"{change:+,.3g} %" if abs(change) < 1000 else f"x {b / a:,.3g}"
 
 
-def _apart(a: Any, b: Any) -> tuple[str, str]:
-    """Write two values briefly, or in full where that would make them look alike."""
-    brief = _text(a), _text(b)
-    return brief if brief[0] != brief[1] or same(a, b) else (_text(a, 17), _text(b, 17))
-
-
-def _text(value: Any, digits: int = 6) -> str:
-    if value is None:
-        return "none"
-    if isinstance(value, bool | np.bool_):
-        return str(bool(value)).lower()
-    if isinstance(value, float | np.floating):
-        return f"{float(value):.{digits}g}"
-    if isinstance(value, np.ndarray) and value.ndim > 1:
-        return str(len(value))
-    if isinstance(value, list | tuple | np.ndarray):
-        return "(" + ", ".join(_text(x, digits) for x in np.ravel(np.asarray(value)).tolist()) + ")"
-    return f"{value:,}" if isinstance(value, int | np.integer) else str(value)
-
-
 def as_dict(found: Comparison) -> dict[str, Any]:
     """Return a comparison as JSON has it."""
     a, b = found.figures
@@ -214,6 +177,7 @@ def as_dict(found: Comparison) -> dict[str, Any]:
         "names": list(found.names),
         "settings": [row._asdict() for row in found.settings],
         "besides": [row._asdict() for row in found.notes],
+        "cut": {side: cut and cut._asdict() for side, cut in zip("ab", found.cuts, strict=True)},
         "outcome": [
             {"solved": each.get("solved"), "status": each.get("status")} for each in (a, b)
         ],
@@ -223,27 +187,5 @@ def as_dict(found: Comparison) -> dict[str, Any]:
     }
 
 
-def parting_as_dict(first: Difference, names: tuple[str, str]) -> dict[str, Any]:
-    """Return the first event that differs as JSON has it; see `parting`."""
-    return {
-        "seq": first.seq,
-        names[0]: _plain(first.left),
-        names[1]: _plain(first.right),
-        "fields": first.fields,
-        "before": [_plain(event) for event in first.before],
-    }
-
-
 def _ratio(a: Any, b: Any) -> float | None:
     return None if a in (None, 0) or b is None else (b - a) / abs(a)
-
-
-def _plain(value: Any) -> Any:
-    """Bring a value to what JSON has; it has no infinity."""
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return None if isinstance(value, float) and not math.isfinite(value) else value

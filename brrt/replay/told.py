@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from brrt.errors import BrrtError
 from brrt.manifest import Manifest
-from brrt.scenario import MOST, Scenario
+from brrt.scenario import MOST
 from brrt.worlds.world import World
 
 _PLAIN = ("planner", "seed", "draws", "time", "smooth", "shortcuts", "execute", "max_move",
@@ -45,12 +47,16 @@ def settings_of(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Ite
         yield from _row(name, getattr(ours, name), getattr(theirs, name))
     limits = (each.make_stop().iterations for each in (ours, theirs))
     yield from _row("iterations", *("no limit" if n >= MOST else n for n in limits))
-    yield from _row("branches", *(_branches(each) for each in (a, b)))
-    yield from rows_of("param", *(_settings(each) for each in (ours, theirs)))
-    yield from rows_of("robot", _robot(a, a_world), _robot(b, b_world))
+    yield from _branches(a, b)
+    robots = list(rows_of("robot", _robot(a, a_world), _robot(b, b_world)))
+    worlds = list(_worlds(a_world, b_world))
+    told = [(each.planner, each.settings()) for each in (ours, theirs)]
+    if told[0] != told[1] or robots or worlds:
+        yield from _params(a, a_world, b, b_world)
+    yield from robots
     yield from _row("start", list(a.start), list(b.start))
     yield from _row("goal", list(a.goal), list(b.goal))
-    yield from _worlds(a_world, b_world)
+    yield from worlds
 
 
 def versions_of(a: Manifest, b: Manifest) -> Iterator[Row]:
@@ -71,18 +77,59 @@ def rows_of(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator
         yield from _row(f"{prefix} {name}".strip(), a.get(name), b.get(name))
 
 
-def _settings(scenario: Scenario) -> dict[str, Any]:
-    """Return the planner's settings, as the command line takes them where the planner decides."""
-    return {k: "auto" if v is None else v for k, v in scenario.settings().items()}
+def _params(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Iterator[Row]:
+    """Yield the planner's settings that differ, those that it decides as they come out."""
+    given = a.scenario.settings(), b.scenario.settings()
+    decided = _decided(a, a_world), _decided(b, b_world)
+    for name in dict.fromkeys([*given[0], *given[1]]):
+        pairs = zip(given, decided, strict=True)
+        values = [auto.get(name, own.get(name)) for own, auto in pairs]
+        if values[0] == values[1]:
+            continue
+        autos = [name in own and own[name] is None for own in given]
+        alike = len({_auto(value) for value in values}) == 1
+        digits = 17 if all(autos) and alike else 6
+        yield Row(
+            f"param {name}",
+            *(_auto(v, digits) if auto else v for v, auto in zip(values, autos, strict=True)),
+        )
 
 
-def _branches(manifest: Manifest) -> str:
-    """Say where the settings changed on the way, and whether the seed did as well."""
-    turns = (
-        f"{branch.iteration:,}" + ("" if branch.seed is None else f" with seed {branch.seed}")
-        for branch in manifest.branches
-    )
-    return ", ".join(turns) or "none"
+def _auto(value: Any, digits: int = 6) -> str:
+    return f"auto: {value:.{digits}g}" if isinstance(value, float) else "auto"
+
+
+def _decided(manifest: Manifest, world: World) -> dict[str, float]:
+    """Return what the settings come out as that the planner decides for its problem."""
+    scenario = manifest.scenario
+    own = [name for name, value in scenario.settings().items() if value is None]
+    if not own:
+        return {}
+    query = replace(scenario, start=manifest.start, goal=manifest.goal)
+    try:
+        problem = query.make_problem(world, manifest.make_robot())
+        contract = scenario.make_planner().contract(problem)
+    except BrrtError:  # a planner that is not known here, or a query that is of no use
+        return {}
+    lengths = {
+        "step": contract.step,
+        "gamma": None if contract.near is None else contract.near.gamma,
+        "connect_distance": contract.link,
+    }
+    return {name: value for name, value in lengths.items() if name in own and value is not None}
+
+
+def _branches(a: Manifest, b: Manifest) -> Iterator[Row]:
+    """Say from what each run branched; also what changed there, where it was not the same."""
+    brief = [", ".join(turn.origin for turn in each.branches) or "none" for each in (a, b)]
+    full = ["; ".join(each.origins) or "none" for each in (a, b)]
+    if _turns(a) != _turns(b):
+        yield Row("branched from", *(brief if brief[0] != brief[1] else full))
+
+
+def _turns(manifest: Manifest) -> list[Any]:
+    """Return what decides a run whose settings changed on the way; names of files do not."""
+    return [(turn.iteration, turn.seed, turn.scenario.settings()) for turn in manifest.branches]
 
 
 def _robot(manifest: Manifest, world: World) -> dict[str, Any]:

@@ -113,5 +113,8 @@ def _by_logical_clock(recording: Recording) -> Recording:
                 table["t"] = TICK_NS * table["seq"]
             yield Events(batch.dof, tables)
 
+    retimed = replace(recording, manifest=manifest, batches=batches)
+    if recording.result is None:
+        return retimed
     # The figures that the writer found hold times of the real clock.
-    return replace(recording, manifest=manifest, batches=batches, result=None)
+    return replace(retimed, result=retimed.metrics().as_dict())

@@ -17,6 +17,9 @@ GREATEST = 1e100
 _SLIGHTLY_BENT = 1e-9
 """A vertex may lie this part of its edges inside the hull: rounding does that to written files."""
 
+_MOST_EDGES = 24
+"""Edges of a polygon that a disc within is fitted to."""
+
 
 def convex_polygon(name: str, values: Any) -> Floats:
     """Read a convex polygon; two vertices make a line segment.
@@ -176,3 +179,29 @@ def touching_pair(parts: list[Floats], apart: int) -> tuple[int, int] | None:
         if j - i >= apart and gap(one, other) <= 0:
             return i, j
     return None
+
+
+def inscribed(polygon: Floats) -> tuple[Floats, float]:
+    """Return the middle, shape (2,), and the radius of a largest disc within a convex polygon.
+
+    The middle is as far from three edges, or four that are parallel in pairs: all triples are
+    tried. Of polygons with many vertices only some edges are, so that the disc may be smaller than
+    the largest; it is within in any case.
+
+    Args:
+        polygon: Vertices counter-clockwise, shape (k, 2); two make a line segment.
+    """
+    middle = polygon.mean(axis=0)
+    if len(polygon) < 3:
+        return middle, 0.0
+    normals = axes_of(polygon)
+    ends = (normals * polygon).sum(axis=1)
+    some = np.linspace(0, len(polygon) - 1, min(len(polygon), _MOST_EDGES)).astype(np.int64)
+    triples = np.array(list(itertools.combinations(some.tolist(), 3)))
+    rows = np.concatenate([normals[triples], np.ones((*triples.shape, 1))], axis=2)
+    sound = np.abs(np.linalg.det(rows)) > _SLIGHTLY_BENT
+    found = np.linalg.solve(rows[sound], ends[triples[sound]][..., None])[:, :2, 0]
+    places = np.concatenate([middle[None], found])
+    radii = (ends - places @ normals.T).min(axis=1)
+    best = int(radii.argmax())
+    return places[best], float(radii[best])

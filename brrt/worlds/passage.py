@@ -30,6 +30,12 @@ _WIDE = 0.05
 _FARTHEST = 32
 """Clearances beyond so many cells are taken to be that."""
 
+_THIN = 64
+"""Cells of a neck that points are compared with."""
+
+_SURE = 1 + 1e-6
+"""Makes up for cells that an obstacle only nearly touches, and for rounding."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Passage:
@@ -47,6 +53,7 @@ class Passage:
         lattice: These.
         behind: Which of these lie behind it, as one comes from the start, as far as they have more
             clearance; none where no narrow place parts start and goal.
+        neck: Middles of the cells without room to spare in a row about the place, shape (k, d).
     """
 
     low: float
@@ -55,10 +62,19 @@ class Passage:
     cell: float
     lattice: Lattice
     behind: Bools
+    neck: Floats
 
     def passed(self, points: Floats) -> Bools:
         """Whether each point, shape (n, d), lies in a cell behind the passage."""
         return np.asarray(self.behind[tuple(self.lattice.index(points).T)])
+
+    def apart(self, points: Floats) -> Floats:
+        """How far each point, shape (n, d), is from the neck, shape (n,)."""
+        thin = self.neck[:: len(self.neck) // _THIN + 1]
+        square = np.full(len(points), np.inf)
+        for middle in thin:
+            np.minimum(square, ((points - middle) ** 2).sum(axis=1), out=square)
+        return np.asarray(np.sqrt(square))
 
 
 def narrowest(world: World, start: Floats, goal: Floats) -> Passage | None:
@@ -69,17 +85,17 @@ def narrowest(world: World, start: Floats, goal: Floats) -> Passage | None:
         start: Where the way begins, shape (d,).
         goal: Where it ends.
     """
-    found, widest = None, np.inf
+    found, most = None, np.inf
     for lattice, free, ends in _lattices(world, start, goal):
         size = float(lattice.cell.max())
         label = None if ends is None else components(free)
         if ends is None or label is None or label[ends[0]] != label[ends[1]] or label[ends[0]] < 0:
             # What lets no cell through is narrower than a few of them, whichever way it runs.
-            widest = 4 * size
+            most = 4 * size
             continue
-        farthest = int(min(_FARTHEST, 0.5 * widest / size + 2))
+        farthest = int(min(_FARTHEST, 0.5 * most / size + 2))
         found = _measured(lattice, free, ends, farthest)
-        widest = found.high
+        most = found.high
         if found.high >= _ENOUGH * size or found.low >= _WIDE * world.extent:
             break
     return found
@@ -113,12 +129,45 @@ def _measured(lattice: Lattice, free: Bools, ends: tuple[Cell, Cell], farthest: 
     beyond = np.zeros(free.shape, np.bool_)
     if label[start] >= 0 and label[goal] >= 0:
         beyond = label == label[goal]
-        index = _neck(square >= least, label, start, goal)
+        row = _neck(square >= least, label, start, goal)
     else:  # one of the ends itself is where there is least room
-        index = start if square[start] <= square[goal] else goal
+        row = np.array([start if square[start] <= square[goal] else goal])
     width = 2 * float(np.sqrt(least))
-    place = np.mean(lattice.corners(np.array(index)), axis=0)
-    return Passage(width - size, width + 2 * size, place, size, lattice, beyond)
+    neck = np.mean(lattice.corners(row), axis=0)
+    place = neck[len(neck) // 2]
+    return Passage(width - size, width + 2 * size, place, size, lattice, beyond, neck)
+
+
+def widest(world: World, start: Floats, goal: Floats, cells: int, enough: float) -> float:
+    """Prove how wide a disc, or a ball, can be at most that gets from start to goal.
+
+    No point of a cell has more room than there is from its middle to that of a cell with some of
+    an obstacle in it, and half a diagonal of each. In a cell that an obstacle fills there is none.
+    A way leads through faces of cells; where it goes through a corner, it touches all cells around.
+
+    Args:
+        world: The world.
+        start: Where the middle of the disc is at first, shape (d,).
+        goal: Where it should get.
+        cells: Cells of the lattice.
+        enough: Widths from here on need not be told apart.
+
+    Returns:
+        The greatest width, or inf if that is more than `enough`; 0 where not even a point gets
+        through.
+    """
+    obstacles = shapes_of(world.solid())
+    lattice = Lattice.over(world.lower, world.upper, cells)
+    size, diagonal = float(lattice.cell.max()), float(np.hypot.reduce(lattice.cell))
+    farthest = int(enough / 2 / size) + 2
+    square = clearance(~lattice.blocked(obstacles), lattice.cell, farthest)
+    room = np.where(lattice.filled(obstacles), 0.0, (np.sqrt(square) + diagonal) * _SURE)
+    one, other = (tuple(lattice.index(end).tolist()) for end in (start, goal))
+    label = components(room > 0)
+    if label[one] != label[other] or label[one] < 0:
+        return 0.0
+    width = 2 * _bottleneck(room, one, other)[0]
+    return width if width <= enough else np.inf
 
 
 def clearance(free: Bools, cell: Floats, farthest: int) -> Floats:
@@ -161,10 +210,10 @@ def _roomiest(square: Floats, cell: Cell) -> Cell:
 
 
 def _bottleneck(square: Floats, start: Cell, goal: Cell) -> tuple[float, Ints]:
-    """Find the greatest clearance with which cells still lead from start to goal.
+    """Find the greatest clearance, as the square or itself, with which cells lead from end to end.
 
     Returns:
-        Its square, and the sets of cells that hang together and have more, -1 for all others.
+        It, and the sets of cells that hang together and have more, -1 for all others.
     """
     rooms = np.unique(square[square > 0])
     rooms = rooms[rooms <= min(square[start], square[goal])]
@@ -177,8 +226,8 @@ def _bottleneck(square: Floats, start: Cell, goal: Cell) -> tuple[float, Ints]:
     return float(rooms[low]), components(square > rooms[low])
 
 
-def _neck(open_: Bools, label: Ints, start: Cell, goal: Cell) -> Cell:
-    """Find the middle of the longest stretch without room to spare on the way with fewest of it.
+def _neck(open_: Bools, label: Ints, start: Cell, goal: Cell) -> Ints:
+    """Find the longest stretch without room to spare on the way with fewest of it, shape (k, d).
 
     Args:
         open_: Cells with at least the bottleneck's clearance.
@@ -207,8 +256,8 @@ def _neck(open_: Bools, label: Ints, start: Cell, goal: Cell) -> Cell:
         else:
             stretches.append([])
     longest = max(stretches, key=len)
-    flat = int(tight[longest[len(longest) // 2] - first])
-    return tuple(int(i) for i in np.unravel_index(flat, label.shape))
+    flat = tight[np.array(longest) - first]
+    return np.stack(np.unravel_index(flat, label.shape), axis=1)
 
 
 def _fewest(links: dict[int, list[int]], start: int, goal: int, first: int) -> dict[int, int]:
@@ -233,4 +282,4 @@ def _fewest(links: dict[int, list[int]], start: int, goal: int, first: int) -> d
     return before
 
 
-__all__ = ["Passage", "clearance", "narrowest"]
+__all__ = ["Passage", "clearance", "narrowest", "widest"]

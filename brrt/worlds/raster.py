@@ -1,5 +1,6 @@
 """Cells over a world: which of them an obstacle touches, and which of them hang together."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
@@ -99,6 +100,30 @@ class Lattice:
                 steps -= np.bincount(row * length + end + 1, minlength=len(steps))
         depth = np.cumsum(steps.reshape(-1, length), axis=1)[:, :-1]
         return np.asarray((depth > 0).reshape(self.shape))
+
+    def filled(self, obstacles: list[Shapes]) -> Bools:
+        """Whether one obstacle fills each closed cell; shape `shape`.
+
+        Obstacles are convex: one that touches all corners of a cell, which is taken to be a little
+        larger than it is, holds it.
+        """
+        found = np.zeros(int(np.prod(self.shape)), np.bool_)
+        corners = np.array(list(itertools.product((0, 1), repeat=len(self.shape))))
+        for shapes in obstacles:
+            large = np.flatnonzero((shapes.high - shapes.low >= self.cell).all(axis=1))
+            for which, row, begin, end in self.spans(shapes, large):
+                for part in portions(end - begin + 1, _PORTION):
+                    owner, offset = expanded((end - begin + 1)[part])
+                    cell = row[part][owner] * self.shape[-1] + begin[part][owner] + offset
+                    index = np.stack(np.unravel_index(cell, self.shape), axis=1)
+                    inside = np.ones(len(cell), np.bool_)
+                    for corner in corners:
+                        slack = (2 * corner - 1) * self.slack()
+                        points = self.lower + (index + corner) * self.cell + slack
+                        left = np.flatnonzero(inside)
+                        inside[left] = shapes.touch(which[part][owner][left], points[left])
+                    found[cell[inside]] = True
+        return found.reshape(self.shape)
 
 
 def touches_box(obstacles: list[Shapes], low: Floats, high: Floats) -> bool:

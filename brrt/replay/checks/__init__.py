@@ -6,9 +6,10 @@ what was kept of them. Its name and the first line of its docstring are what peo
 one, write it and put it into `RULES` at the end of its file.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from inspect import isgeneratorfunction
 from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from brrt.events import Events
 from brrt.manifest import Manifest
 from brrt.planners.contract import Contract
 from brrt.replay.checks import (
+    acts,
     draws,
     growth,
     lattice,
@@ -26,6 +28,7 @@ from brrt.replay.checks import (
     rewiring,
     searches,
     trees,
+    walk,
 )
 from brrt.replay.checks.case import Case, Windows
 from brrt.replay.checks.tally import Finding, Tally
@@ -34,8 +37,8 @@ from brrt.worlds.world import World
 Rule = Callable[[Case, Tally], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES, *rejects.RULES,
-    *paths.RULES, *moves.RULES, *lattice.RULES, *searches.RULES,
+    *log.RULES, *acts.RULES, *draws.RULES, *trees.RULES, *growth.RULES, *rewiring.RULES,
+    *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *walk.RULES, *searches.RULES,
 )  # fmt: skip
 
 
@@ -50,6 +53,7 @@ def examine(
     contract: Contract | None = None,
     *,
     cut: bool | Callable[[], bool] = False,
+    figures: Mapping[str, Any] | None = None,
 ) -> list[Tally]:
     """Hold a run to all rules; return for each what it looked at and what it found.
 
@@ -63,11 +67,12 @@ def examine(
             and of one that is not known here only what all planners do.
         cut: Whether the log breaks off, or what says so once it was read; what is promised of the
             end is then left out.
+        figures: Those that stand at the recording's end, under the names of `Metrics`.
 
     Raises:
         BrrtError: The manifest's query is of no use in its world.
     """
-    case = Case.of(manifest, world, contract, cut if callable(cut) else lambda: bool(cut))
+    case = Case.of(manifest, world, contract, cut if callable(cut) else lambda: bool(cut), figures)
     firsts = [first for first, _ in case.stretches[1:]]
     tallies, looking = [], []
     # A doctored log may hold anything, so arithmetic on it may overflow; that is no news.
@@ -124,6 +129,8 @@ def check(
     world: World,
     events: Events | Iterable[Events],
     contract: Contract | None = None,
+    *,
+    figures: Mapping[str, Any] | None = None,
 ) -> list[Finding]:
     """Return the promises that a run breaks, in the order of its events; of each rule the first.
 
@@ -132,7 +139,8 @@ def check(
     Raises:
         BrrtError: The manifest's query is of no use in its world.
     """
-    found = [f for tally in examine(manifest, world, events, contract) for f in tally.findings]
+    tallies = examine(manifest, world, events, contract, figures=figures)
+    found = [f for tally in tallies for f in tally.findings]
     return sorted(found, key=lambda finding: finding.seq)
 
 

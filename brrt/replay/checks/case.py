@@ -1,6 +1,6 @@
 """What rules look at."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -111,6 +111,8 @@ class Case:
             than one where a run went on from a recorded one with other settings.
         known: Whether the planner is known here, so that there is a contract.
         breaks_off: Says, once the log was read, whether it breaks off.
+        figures: What stands at the recording's end, under the names of `Metrics`; None where
+            nothing does.
     """
 
     manifest: Manifest
@@ -125,6 +127,7 @@ class Case:
     stretches: tuple[tuple[int, Contract], ...]
     known: bool
     breaks_off: Callable[[], bool]
+    figures: Mapping[str, Any] | None = None
 
     @classmethod
     def of(
@@ -133,6 +136,7 @@ class Case:
         world: World,
         contract: Contract | None = None,
         breaks_off: Callable[[], bool] = lambda: False,
+        figures: Mapping[str, Any] | None = None,
     ) -> Self:
         """Open the case of a recording.
 
@@ -141,6 +145,7 @@ class Case:
             world: The run's.
             contract: What the planner promises; by default what the registered one does.
             breaks_off: Says, once the log was read, whether it breaks off.
+            figures: What stands at the recording's end.
 
         Raises:
             BrrtError: Its query is of no use in its world.
@@ -156,13 +161,14 @@ class Case:
         bounds = np.array(problem.space.lower), np.array(problem.space.upper)
         return cls(
             manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
-            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off,
+            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off, figures,
         )  # fmt: skip
 
     @cached_property
     def scripts(self) -> Scripts:
         """The log's events in one table, iteration by iteration, for rules that read it so."""
-        return Scripts(self.dof, {first for first, _ in self.stretches})
+        growing = any(contract.growth is not None for _, contract in self.stretches)
+        return Scripts(self.dof, {first for first, _ in self.stretches}, growing=growing)
 
     @cached_property
     def events(self) -> Events:
@@ -224,10 +230,26 @@ class Case:
         """For each motion the number of an obstacle that it runs into, or -1."""
         return first_hits(self.obstacles, self.robot, np.asarray(a), np.asarray(b))
 
-    def look_free(self, tally: Tally, table: Table, a: Floats, b: Floats, what: str) -> None:
-        """See that the motion of each row of a table is free; shapes (n, dof)."""
+    def look_free(
+        self, tally: Tally, table: Table, a: Floats, b: Floats, what: str, name: str | None = None
+    ) -> None:
+        """See that the motion of each row of a table is free.
+
+        Args:
+            tally: Takes it in.
+            table: The events, shape (n,).
+            a: Where motions begin, shape (n, dof).
+            b: Where they end, shape (n, dof).
+            what: What a motion is.
+            name: The field that tells it from others; None where none does.
+        """
         hit = self.blocked(a, b)
-        tally.look(table, hit >= 0, lambda i: f"{what} hits {self.obstacles.name(int(hit[i]))}")
+
+        def say(i: int) -> str:
+            which = what if name is None else f"{what} {table[name][i]}"
+            return f"{which} hits {self.obstacles.name(int(hit[i]))}"
+
+        tally.look(table, hit >= 0, say)
 
     @cached_property
     def trees(self) -> list[Grown]:

@@ -78,9 +78,16 @@ class _Past:
 
 
 def samples(case: Case, tally: Tally) -> Windows:
-    """Samples of the goal are the goal; the other tree's goal is the start."""
+    """Samples of the goal are the goal, and no others; the other tree's goal is the start."""
+    wide = case.upper - case.lower
+    fine = bool((wide > _FINE * np.abs([case.lower, case.upper]).max(axis=0)).all())
     while (window := (yield)) is not None:
         table = window[Kind.SAMPLE]
+        drawn = table[table["source"] == Source.UNIFORM]
+        # By chance the very goal is drawn where there are few numbers to draw, or one axis.
+        at_goal = (np.asarray(drawn["q"]) == case.goal).all(axis=1)
+        if case.known and fine and case.dof > 1:
+            tally.look(drawn, at_goal, lambda _: "a draw from the bounds is the very goal")
         goals = table[table["source"] == Source.GOAL]
         q = np.asarray(goals["q"])
         wrong = (q != case.goal).any(axis=1)

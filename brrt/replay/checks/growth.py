@@ -91,6 +91,9 @@ def _aimed(contract: Contract, lines: Table) -> Ints:
     if contract.growth is not None and contract.growth.links is not None:
         # Where the other tree goes on, it heads for the node that has just been added.
         aimed |= (now["kind"] == Kind.EDGE) & (after["tree"] == 1 - now["tree"])
+        # It may do so where none was added, and head for an older one.
+        failed = (now["kind"] == Kind.REJECT) & (contract.near is None)
+        aimed |= failed & (after["tree"] == 1 - now["tree"])
     return np.flatnonzero(moved & aimed)
 
 
@@ -101,9 +104,13 @@ def _look_steered(case: Case, tally: Tally, contract: Contract, tree: Grown, pai
     number = np.where(aim["kind"] == Kind.SAMPLE, aim["tree"], 1 - aim["tree"])
     mine = number == tree.number
     aim, done = aim[mine], done[mine]
-    q, target, to = np.asarray(tree.edges["q"]), np.asarray(aim["q"]), np.asarray(done["q"])
+    q, target, to = np.asarray(tree.edges["q"]), np.array(aim["q"]), np.asarray(done["q"])
     if not len(aim):
         return
+    for other in case.trees if (aim["kind"] == Kind.REJECT).any() else ():
+        theirs = (aim["kind"] == Kind.REJECT) & (aim["tree"] == other.number)
+        newest = np.searchsorted(other.edges["seq"], aim["seq"][theirs]) - 1
+        target[theirs] = np.asarray(other.edges["q"])[np.maximum(newest, 0)]
     meets = done["kind"] == Kind.CONNECT
     to = np.where(meets[:, None], target, to)
     origin = np.where(done["kind"] == Kind.EDGE, done["parent"], done["node"]).astype(np.int64)
@@ -212,13 +219,12 @@ def _look_acts(tally: Tally, growth: Growth, lines: Table) -> None:
         ],
         default=True,
     )
-    kinds = [Kind(k).label for k in after["kind"][~right & begun][:20].tolist()]
-    where = np.cumsum(~right & begun) - 1
+    acts = begun & np.isin(now["kind"], [Kind.SAMPLE, Kind.EDGE, Kind.REJECT, Kind.CONNECT])
+    some, wrong, turn, kinds = now[acts], ~right[acts], tree[acts], after["kind"][acts]
     tally.look(
-        now[begun & (edge | reject)], (~right)[begun & (edge | reject)],
+        some, wrong,
         lambda i: (
-            f"what follows in tree {tree[begun & (edge | reject)][i]}'s turn, "
-            f"{kinds[min(where[begun & (edge | reject)][i], len(kinds) - 1)]}, is not due"
+            f"what follows in tree {turn[i]}'s turn, {Kind(kinds[i]).label}, is not due"
         ),
     )  # fmt: skip
 
@@ -293,6 +299,14 @@ def _look_met(case: Case, tally: Tally, link: float, lines: Table, pair: list[In
     tally.look(
         some, due & ~told,
         lambda i: f"the newest nodes are {far[i]:.9g} apart, and nobody tries to join them",
+    )  # fmt: skip
+    at = np.flatnonzero(blocked)
+    tries, newest = lines[at], [lines[rows[at]] for rows in pair]
+    wrong = (tries["tree"] != 0) | (tries["node"] != newest[0]["node"])
+    wrong |= (tries["q"] != newest[1]["q"]).any(axis=1)
+    tally.look(
+        tries, np.asarray(wrong),
+        lambda i: f"a link from node {tries['node'][i]} to {text(tries['q'][i])}, not the newest",
     )  # fmt: skip
     at = np.flatnonzero(lines["kind"] == Kind.CONNECT)
     links = lines[at]

@@ -1,15 +1,13 @@
 """Rules about searches on a lattice: cells, expansions, estimates, and the moves they lead to."""
 
-from collections.abc import Iterator
-from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Phase, Stage, Status, Table
+from brrt.events import Kind, Phase, Stage, Status, Table
 from brrt.planners.contract import Lattice
-from brrt.replay.checks.case import CLOSE, Case, Windows
+from brrt.replay.checks.case import CLOSE, Case
 from brrt.replay.checks.log import text
 from brrt.replay.checks.tally import Tally
 
@@ -85,7 +83,7 @@ def _first_with(keys: Ints, values: Ints) -> Ints:
     return np.asarray(values[first][inverse.reshape(-1)])
 
 
-def _adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
+def adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
     """Whether cells are neighbours, integer coordinates of shape (n, d)."""
     apart = np.abs(b - a)
     if lattice.diagonals:
@@ -94,10 +92,14 @@ def _adjacent(lattice: Lattice, a: Ints, b: Ints) -> NDArray[np.bool_]:
 
 
 def expansions(case: Case, tally: Tally) -> None:
-    """A cell is reached from a neighbour that its search expanded, freely; its cost is right."""
+    """A cell is reached from a neighbour that its search expanded, freely; its cost is right.
+
+    A search begins where the robot is, and expands no cell twice.
+    """
     lattice, table = lattice_of(case), case.events[Kind.EXPAND]
     if lattice is None or not len(table):
         return
+    _look_begun(case, tally, lattice, table)
     parent = _parents(table)
     root = table["parent"] < 0
     tally.look(
@@ -109,7 +111,7 @@ def expansions(case: Case, tally: Tally) -> None:
     )  # fmt: skip
     some, above = table[parent >= 0], table[parent[parent >= 0]]
     a, b = np.asarray(above["q"]), np.asarray(some["q"])
-    apart = ~_adjacent(lattice, indices(case, lattice, a), indices(case, lattice, b))
+    apart = ~adjacent(lattice, indices(case, lattice, a), indices(case, lattice, b))
     tally.look(
         some, apart,
         lambda i: f"cells {above['cell'][i]} and {some['cell'][i]} are no neighbours",
@@ -120,6 +122,36 @@ def expansions(case: Case, tally: Tally) -> None:
         lambda i: f"cell {some['cell'][i]} costs {cost[i]:.12g}, not {some['cost'][i]:.12g}",
     )  # fmt: skip
     case.look_free(tally, some, a, b, "motion between cells")
+
+
+def _look_begun(case: Case, tally: Tally, lattice: Lattice, table: Table) -> None:
+    """See that searches begin where the robot is then, once at each place, and repeat no cell."""
+    root = table["parent"] < 0
+    search = np.cumsum(root)
+    again = np.ones(len(table), bool)
+    again[np.unique(np.stack([search, table["cell"]]), axis=1, return_index=True)[1]] = False
+    tally.look(table, again, lambda i: f"cell {table['cell'][i]} is expanded again in one search")
+    moves, paths = case.events[Kind.MOVE], case.events[Kind.PATH]
+    begins = table[root]
+    moved = np.searchsorted(moves["seq"], begins["seq"])
+    told = np.searchsorted(paths["seq"], begins["seq"])
+    q, back = case.start + np.zeros((len(begins), case.dof)), moved == 0
+    last = moves[np.maximum(moved, 1) - 1] if len(moves) else moves
+    if len(moves):
+        # A path is told on arrival, and the next trial begins at the start.
+        back |= (last["cell"] < 0) | (np.append(-1, paths["seq"])[told] > last["seq"])
+        q[~back] = last["q"][~back]
+    off = np.abs(np.asarray(begins["q"]) - q).max(axis=1, initial=0)
+    # Who goes on with another lookahead plans anew.
+    idle = np.diff(moved + told, prepend=-1) == 0
+    idle &= np.diff(case.stretch(begins), prepend=0) == 0
+    tally.look(
+        begins, ~(off <= CLOSE * lattice.epsilon + case.blur) | idle,
+        lambda i: (
+            f"another search from cell {begins['cell'][i]} without a move" if idle[i]
+            else f"a search from {text(begins['q'][i])}; the robot is at {text(q[i])}"
+        ),
+    )  # fmt: skip
 
 
 def _parents(table: Table) -> Ints:
@@ -145,7 +177,10 @@ def estimates(case: Case, tally: Tally) -> None:
     same = np.diff(table["cell"][order], prepend=-(1 << 31)) == 0
     before = case.distance(np.asarray(table["q"]), case.goal[None])
     before[order[same]] = h[order[np.flatnonzero(same) - 1]]
-    wrong = ~(h > before - case.blur)
+    # The first is compared with a distance, which is rounded.
+    slack = np.full(len(table), case.blur)
+    slack[order[same]] = 0.0
+    wrong = ~(h > before - slack)
     tally.look(
         table, wrong,
         lambda i: f"cell {table['cell'][i]}: an estimate of {h[i]:.12g} after {before[i]:.12g}",
@@ -198,7 +233,7 @@ def lattice_moves(case: Case, tally: Tally) -> None:
         return
     before = _origins(case, table)
     goal = table["cell"] < 0
-    near = _adjacent(lattice, *(indices(case, lattice, q) for q in (before, table["q"])))
+    near = adjacent(lattice, *(indices(case, lattice, q) for q in (before, table["q"])))
     wrong = np.where(goal, (np.asarray(table["q"]) != case.goal).any(axis=1), ~near)
     tally.look(
         table, wrong,
@@ -221,116 +256,8 @@ def _origins(case: Case, table: Table) -> Floats:
     return before
 
 
-def choices(case: Case, tally: Tally) -> Windows:
-    """With a lookahead of 1 each move is to a free neighbour of least cost and estimate.
-
-    The estimate of the cell that it leads from is raised to that, and is else what it was.
-    """
-    lattice = lattice_of(case)
-    grids = [contract.lattice for _, contract in case.stretches]
-    short = any(grid is not None and grid.lookahead == 1 for grid in grids)
-    walk = _Walk(case, lattice) if lattice is not None and short else None
-    while (window := (yield)) is not None:
-        if lattice is None or walk is None:
-            continue
-        ruling = case.ruling(window).lattice
-        judged = ruling is not None and ruling.lookahead == 1
-        for kind, event, place in _in_order(case, lattice, window):
-            if kind is Kind.REJECT:
-                walk.reject(int(event["node"]), place)
-            elif kind is Kind.HEURISTIC:
-                walk.h[place] = float(event["h"])
-                walk.raised = place
-            elif kind is Kind.EXPAND:
-                walk.look(int(event["cell"]), place)
-            elif event["cell"] >= 0:
-                walk.numbers[place] = int(event["cell"])
-                if judged:
-                    tally.one(event, walk.judge(place))
-
-
-def _in_order(case: Case, lattice: Lattice, window: Events) -> Iterator[tuple[Kind, np.void, Cell]]:
-    """Yield what a search says, one after the other, with its place on the lattice."""
-    rows = [
-        (int(seq), kind, event, place)
-        for kind in (Kind.REJECT, Kind.HEURISTIC, Kind.EXPAND, Kind.MOVE)
-        for seq, event, place in zip(
-            window[kind]["seq"], window[kind],
-            map(tuple, indices(case, lattice, window[kind]["q"]).tolist()), strict=True,
-        )
-    ]  # fmt: skip
-    rows.sort(key=lambda row: row[0])
-    for _, kind, event, place in rows:
-        yield kind, event, place
-
-
-class _Walk:
-    """What a robot knows that looks one cell ahead."""
-
-    def __init__(self, case: Case, lattice: Lattice) -> None:
-        self.case, self.lattice = case, lattice
-        self.h: dict[Cell, float] = {}
-        self.blocked: dict[int, set[Cell]] = {}
-        self.at: tuple[int, Cell] | None = None
-        self.raised: Cell | None = None
-        self.numbers: dict[Cell, int] = {}
-        steps = product((-1, 0, 1), repeat=len(case.start))
-        most = len(case.start) if lattice.diagonals else 1
-        self.steps = [step for step in steps if 0 < sum(map(abs, step)) <= most]
-
-    def reject(self, cell: int, place: Cell) -> None:
-        """Learn that a neighbour cannot be reached."""
-        self.blocked.setdefault(cell, set()).add(place)
-
-    def look(self, cell: int, place: Cell) -> None:
-        """Look around from a cell; its estimate is still the one from before."""
-        self.at, self.raised, self.numbers[place] = (cell, place), None, cell
-
-    def estimate(self, place: Cell) -> float:
-        """Return the estimate of the cost-to-go, which begins as the distance."""
-        if place not in self.h:
-            q = self.case.start + self.lattice.epsilon * np.array(place)
-            self.h[place] = float(self.case.distance(q[None], self.case.goal[None])[0])
-        return self.h[place]
-
-    def judge(self, target: Cell) -> str | None:
-        """Say what is wrong with a move to a cell."""
-        if self.at is None:
-            return "a move without a look around"
-        cell, place = self.at
-        self.at = None
-        blocked = self.blocked.get(cell, set())
-        if target in blocked:
-            return f"a move to {list(target)}, which was found blocked"
-        costs = {
-            other: self.lattice.epsilon * sum(map(abs, step)) ** 0.5 + self.estimate(other)
-            for step in self.steps
-            if (other := tuple(x + s for x, s in zip(place, step, strict=True))) not in blocked
-        }
-        best, chosen = min(costs.values(), default=np.inf), costs.get(target, np.inf)
-        now = self.estimate(place)
-        if not self.case.at_most(np.asarray(min(best, 1e300)), now):
-            return f"the estimate of cell {cell} stays at {now:.12g}; it is to rise to {best:.12g}"
-        if self.raised == place and not self.case.at_most(np.asarray(now), best):
-            return f"the estimate of cell {cell} rises to {now:.12g}; it is to be {best:.12g}"
-        if not self.case.at_most(np.asarray(chosen), best):
-            return f"a move of cost and estimate {chosen:.12g}; {best:.12g} was there"
-        return self._tie(target, costs) if self.lattice.ordered else None
-
-    def _tie(self, target: Cell, costs: dict[Cell, float]) -> str | None:
-        """Say whether another cell of the very same cost and estimate goes before the target."""
-        h, number = self.estimate(target), self.numbers.get(target, 0)
-        for other, cost in costs.items():
-            if cost == costs[target] and other != target:
-                if self.estimate(other) < h:
-                    return f"of equal ones, {list(other)} is closer to the goal"
-                if self.estimate(other) == h and self.numbers.get(other, number) < number:
-                    return f"of equal ones, {list(other)} was seen first"
-        return None
-
-
 RULES = (
     cells_on_lattice, cells_keep_their_numbers, expansions, estimates, estimates_admissible,
-    lattice_moves, choices,
+    lattice_moves,
 )  # fmt: skip
 """All rules of this file; see `brrt.replay.checks`."""

@@ -1,17 +1,23 @@
 """Rules about any log: how it is numbered, what it says of its phases, what lies in bounds."""
 
+import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Kind, Phase, Status, Table
+from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.replay.checks.bodies import endless
 from brrt.replay.checks.case import CLOSE, Case, Windows, waypoints
 from brrt.replay.checks.tally import Tally
+from brrt.replay.metrics import Metrics
 
 _TICK_S = 1e-3
 """A real clock is read so often, at least."""
+
+_ONE_MOTION = 2
+"""Waypoints of a path that cannot be shortened."""
 
 _HEAD = np.dtype([("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")])
 
@@ -154,11 +160,16 @@ def budget(case: Case, tally: Tally) -> None:
 
 
 def endings(case: Case, tally: Tally) -> None:
-    """A budget that is said to have ended planning was used up; a path that was to end it did."""
+    """What is said to have ended a phase did: a budget was used up, a path found, all was done."""
     phases = case.events[Kind.PHASE]
     plan = phases[phases["name"] == Phase.PLAN]
     ends = plan[plan["status"] != Status.BEGIN][-1:]
-    if not case.known or not len(ends):
+    if not case.known:
+        return
+    after = phases[(phases["name"] != Phase.PLAN) & (phases["status"] != Status.BEGIN)]
+    for event in after:
+        tally.one(event, _not_done(case, event))
+    if not len(ends):
         return
     scenario, wrong = case.manifest.scenario, None
     if case.outcome is Status.ITERATION_LIMIT:
@@ -171,7 +182,30 @@ def endings(case: Case, tally: Tally) -> None:
             wrong = f"planning ended after {took:.6f} s; it had {scenario.time:g} s"
     elif case.outcome is Status.SOLVED and case.contract.stops is False:
         wrong = "planning ended as solved; it was to go on for a better path"
-    tally.one(ends[0], wrong)
+    tally.one(ends[0], wrong or _impossible(case))
+
+
+def _impossible(case: Case) -> str | None:
+    """Say why planning cannot have ended as it is said to have."""
+    if case.outcome is Status.NO_PATH and case.contract.lattice is None:
+        return "planning ended as if there were no path, which only a search can prove"
+    if case.outcome is Status.DONE:
+        return "planning is said to be done, which is no way for it to end"
+    return None
+
+
+def _not_done(case: Case, event: np.void) -> str | None:
+    """Say why the smoother or the robot cannot have ended as it is said to have."""
+    status, name = int(event["status"]), int(event["name"])
+    if status == Status.INTERRUPTED:
+        return None
+    if status != Status.DONE:
+        return f"{_phase(name)} can only be done or interrupted"
+    attempts, due = len(case.events[Kind.SHORTCUT]), case.manifest.scenario.shortcuts
+    left = [len(path) for said, path in case.paths if said["stage"] == Stage.SMOOTHED][-1:]
+    if name == Phase.SMOOTH and attempts < due and left and left[0] > _ONE_MOTION:
+        return f"{attempts:,} of {due:,} attempts to smooth were made"
+    return None
 
 
 def _left(case: Case) -> str | None:
@@ -182,6 +216,33 @@ def _left(case: Case) -> str | None:
     # Where failed draws do not count, their number has an end all the same.
     spent |= made < draws and draws >= 1000 * limit
     return None if made >= limit or spent else f"planning made {made:,} of {limit:,} iterations"
+
+
+def figures(case: Case, tally: Tally) -> Windows:
+    """The figures at a recording's end are those of its events; numbers may be rounded."""
+    stated = case.figures
+    metrics = None if stated is None else Metrics(case.manifest)
+    while (window := (yield)) is not None:
+        if metrics is not None:
+            metrics.write(window)
+    if stated is None or metrics is None:
+        return
+    for name, figure in metrics.as_dict().items():
+        if name in stated:
+            wrong = not _same_figure(stated[name], figure)
+            said = " ".join(f"{name} is {stated[name]!r}, by the events {figure!r}".split())
+            tally.one(None, f"{said:.160}" if wrong else None)
+
+
+def _same_figure(a: Any, b: Any) -> bool:
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(map(_same_figure, a, b))
+    if isinstance(a, float) or isinstance(b, float):
+        try:
+            return math.isclose(a, b, rel_tol=CLOSE)
+        except TypeError:
+            return False
+    return type(a) is type(b) and bool(a == b)
 
 
 def bounds(case: Case, tally: Tally) -> Windows:
@@ -210,5 +271,5 @@ def text(q: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in np.asarray(q).tolist()) + ")"
 
 
-RULES = (numbering, times, phases, names, outcome, budget, endings, bounds)
+RULES = (numbering, times, phases, names, outcome, budget, endings, figures, bounds)
 """All rules of this file; see `brrt.replay.checks`."""

@@ -90,14 +90,46 @@ def moves_free(case: Case, tally: Tally) -> None:
 
 
 def arrival(case: Case, tally: Tally) -> None:
-    """Where the run is solved and nobody stopped it, the last move ends at the goal."""
+    """Where the robot has done what it was to do, its last move ends at the goal."""
+    table, phases = case.events[Kind.MOVE], case.events[Kind.PHASE]
+    done = ((phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.DONE)).any()
+    stopped = (phases["status"][-1:] == Status.INTERRUPTED).any()
+    solved = case.outcome is Status.SOLVED and (len(table) or _learns(case))
+    if case.cut or stopped or not (done or solved):
+        return
+    last = np.asarray(table["q"][-1]) if len(table) else case.start
+    there, event = (last == case.goal).all(), table[-1] if len(table) else None
+    tally.one(event, None if there else f"the last move ends at {text(last)}, not at the goal")
+
+
+def _learns(case: Case) -> bool:
+    """Whether a robot moves while its search goes on."""
+    lattice = case.contract.lattice
+    return lattice is not None and lattice.lookahead is not None
+
+
+def paths_walked(case: Case, tally: Tally) -> None:
+    """Of a robot that learns as it goes, each trial is a path: where it went, told on arrival."""
+    if not _learns(case):
+        return
     table = case.events[Kind.MOVE]
-    phases = case.events[Kind.PHASE]
-    stopped = bool((phases["status"][-1:] == Status.INTERRUPTED).any())
-    if len(table) and case.outcome is Status.SOLVED and not case.cut and not stopped:
-        there = (np.asarray(table["q"][-1]) == case.goal).all()
-        wrong = f"the last move ends at {text(table['q'][-1])}, not at the goal"
-        tally.one(table[-1], None if there else wrong)
+    for trial, (event, path) in enumerate(case.found):
+        mine = table[table["trial"] == trial]
+        way = np.concatenate([case.start[None], np.asarray(mine["q"])])
+        wrong = None if np.array_equal(way, path) else f"not where the robot went in trial {trial}"
+        if len(mine) and mine["seq"][-1] > event["seq"]:
+            wrong = f"trial {trial} goes on after its path was told"
+        elif len(mine) and mine["cell"][-1] < 0 and mine["seq"][-1] + 1 != event["seq"]:
+            wrong = f"trial {trial} had arrived before, with event {mine['seq'][-1]}"
+        tally.one(event, wrong)
+    untold = table[table["trial"] > len(case.found)]
+    tally.look(
+        untold[:1], np.ones(len(untold[:1]), bool),
+        lambda i: f"trial {untold['trial'][i]} begins; {len(case.found)} before it arrived",
+    )  # fmt: skip
+    trials = case.manifest.stretches[-1][1].settings().get("trials", 1)
+    if case.outcome is Status.SOLVED and len(case.found) < trials:
+        tally.one(None, f"{len(case.found)} of {trials} trials arrived")
 
 
 def moves_along_path(case: Case, tally: Tally) -> None:
@@ -150,5 +182,7 @@ class _Polyline:
         return None
 
 
-RULES = (moves, move_costs, move_lengths, moves_free, arrival, moves_along_path)
+RULES = (
+    moves, move_costs, move_lengths, moves_free, arrival, paths_walked, moves_along_path,
+)  # fmt: skip
 """All rules of this file; see `brrt.replay.checks`."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Stage
+from brrt.events import Kind, Phase, Stage, Status
 from brrt.replay.checks.case import Case
 from brrt.replay.checks.log import text
 from brrt.replay.checks.tally import Tally
@@ -53,12 +53,23 @@ def path_costs(case: Case, tally: Tally) -> None:
 
 
 def paths_improve(case: Case, tally: Tally) -> None:
-    """Of the paths that a planner finds, each costs less than the one before."""
-    before = None
+    """The first path that a planner finds is raw, the others cost less; who stops finds but one.
+
+    Of a robot that learns as it goes each trial's path is raw.
+    """
+    lattice, before = case.contract.lattice, None
+    learns = lattice is not None and lattice.lookahead is not None
+    one = case.contract.stops is True or (lattice is not None and not learns)
     for event, _ in case.found:
-        cost = float(event["cost"])
-        if before is not None and event["stage"] == Stage.IMPROVED:
-            tally.one(event, None if cost < before else f"cost {cost:.12g} after {before:.12g}")
+        cost, stage, wrong = float(event["cost"]), int(event["stage"]), None
+        due = Stage.RAW if before is None or learns else Stage.IMPROVED
+        if before is not None and stage == Stage.IMPROVED and not cost < before:
+            wrong = f"cost {cost:.12g} after {before:.12g}"
+        elif before is not None and one:
+            wrong = "another path, of a planner that stops at the first"
+        elif case.known and stage != due:
+            wrong = f"said to be of stage {stage}; it is {due.name.lower()}"
+        tally.one(event, wrong)
         before = cost
 
 
@@ -172,7 +183,7 @@ def _attempt(case: Case, event: Any, path: Floats, cost: float) -> tuple[str | N
 
 
 def smoothed(case: Case, tally: Tally) -> None:
-    """The smoothed path is what the accepted shortcuts leave; it costs no more."""
+    """One smoothed path is told: what the accepted shortcuts leave; it costs no more."""
     table, raw = case.events[Kind.SHORTCUT], None
     done = 0
     for event, path in case.paths:
@@ -189,6 +200,11 @@ def smoothed(case: Case, tally: Tally) -> None:
         if not float(event["cost"]) <= raw[0] * (1 + 1e-12):
             wrong = f"costs {event['cost']:.12g}, more than {raw[0]:.12g} before"
         tally.one(event, wrong)
+    phases = case.events[Kind.PHASE]
+    ends = phases[(phases["name"] == Phase.SMOOTH) & (phases["status"] != Status.BEGIN)]
+    told = sum(event["stage"] == Stage.SMOOTHED for event, _ in case.paths)
+    if len(ends) and told != len(ends):
+        tally.one(ends[-1], f"the smoother has told {told} paths, not one")
 
 
 def _shortened(path: Floats, attempts: NDArray[np.void]) -> Floats:

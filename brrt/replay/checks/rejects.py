@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Table, table_dtype
-from brrt.replay.checks.case import Case, Windows
+from brrt.events import Kind, Reason, Stage, Table, table_dtype
+from brrt.planners.contract import Contract
+from brrt.replay.checks.case import CLOSE, Case, Windows
 from brrt.replay.checks.keeping import Thinned
 from brrt.replay.checks.log import text
 from brrt.replay.checks.motions import all_clear
@@ -15,6 +16,9 @@ Ints = NDArray[np.int64]
 
 MOST = 20_000
 """Of more rejections than this, so many are looked at, evenly spread over the log."""
+
+_SEEN_IN_TREES = (Reason.NO_PROGRESS, Reason.LINK_BLOCKED, Reason.COLLISION)
+"""Reasons that are held to where nodes are."""
 
 _BLOCKED = (Reason.COLLISION, Reason.GOAL_BLOCKED, Reason.LINK_BLOCKED, Reason.NEAR_BLOCKED)
 
@@ -48,16 +52,102 @@ def rejections(case: Case, tally: Tally) -> Windows:
     )  # fmt: skip
 
 
+def reasons(case: Case, tally: Tally) -> Windows:
+    """What is rejected is so for a reason that the planner has, and that holds.
+
+    An extension makes no progress where it ends at its node, is of no gain where the best path told
+    costs no more, and a link leads to the other tree's newest node. Where that takes a look at the
+    trees, 20,000 are looked at.
+    """
+    kept, best = Thinned(table_dtype(Kind.REJECT, case.dof), MOST), np.inf
+    while (window := (yield)) is not None:
+        table, paths = window[Kind.REJECT], window[Kind.PATH]
+        paths = paths[paths["stage"] != Stage.SMOOTHED]
+        costs = np.append(best, paths["cost"])
+        told, best = costs[np.searchsorted(paths["seq"], table["seq"])], float(costs[-1])
+        if not _has_reasons(case):
+            continue
+        q, reason = np.asarray(table["q"]), table["reason"]
+        through = case.distance(case.start[None], q) + case.distance(q, case.goal[None])
+        no_gain = through >= told * (1 - CLOSE) - case.blur
+        to_goal = (q == case.goal).all(axis=1)
+        right = np.isin(reason, _possible(case.ruling(window)))
+        right &= (reason != Reason.NO_GAIN) | no_gain
+        right &= (reason != Reason.GOAL_BLOCKED) | to_goal
+        tally.look(
+            table, np.asarray(~right),
+            lambda i, r=reason, q=q: f"{_named(int(r[i]))} is no reason for {text(q[i])} to be",  # type: ignore[misc]
+        )  # fmt: skip
+        kept.add(table[np.isin(reason, _SEEN_IN_TREES)])
+    if case.contract.growth is not None:
+        _look_at_trees(case, tally, kept.rows())
+
+
+def _look_at_trees(case: Case, tally: Tally, table: Table) -> None:
+    """Hold reasons to where the nodes of the trees are."""
+    q, reason = np.asarray(table["q"]), table["reason"]
+    stays = reason == Reason.NO_PROGRESS
+    way = case.distance(_origins(case, table), q)
+    tally.look(
+        table, stays & ~(way <= case.blur),
+        lambda i: f"an extension of {way[i]:.9g} is said to make no progress",
+    )  # fmt: skip
+    # Trees that rewire head for each other's nodes without the aim of joining them.
+    links = reason == Reason.LINK_BLOCKED
+    to_newest = np.zeros(len(table), bool)
+    for tree in case.trees:
+        theirs = np.flatnonzero(table["tree"] == 1 - tree.number)
+        newest = np.searchsorted(tree.edges["seq"], table["seq"][theirs]) - 1
+        ends = np.asarray(tree.edges["q"])[newest]
+        to_newest[theirs] = (newest >= 0) & (q[theirs] == ends).all(axis=1)
+    judged = links | ((reason == Reason.COLLISION) & (case.contract.near is None))
+    tally.look(
+        table, judged & (links != to_newest),
+        lambda i: f"{text(q[i])} is{'' if to_newest[i] else ' not'} the other tree's newest node",
+    )  # fmt: skip
+
+
+def _has_reasons(case: Case) -> bool:
+    return case.contract.growth is not None or case.contract.lattice is not None
+
+
+def _possible(contract: Contract) -> list[int]:
+    """Why a planner may reject something."""
+    found = [Reason.COLLISION]
+    if contract.lattice is not None:
+        found.append(Reason.LIMITS)
+    if contract.growth is not None:
+        found.append(Reason.NO_PROGRESS)
+        found += [Reason.GOAL_BLOCKED] * contract.growth.goal_test
+        found += [Reason.LINK_BLOCKED] * (contract.growth.links is not None)
+    if contract.near is not None:
+        found.append(Reason.NEAR_BLOCKED)
+    if contract.draws is not None and contract.draws.informed:
+        found.append(Reason.NO_GAIN)
+    return [int(reason) for reason in found]
+
+
+def _named(reason: int) -> str:
+    known = reason in set(Reason)
+    return Reason(reason).name.lower().replace("_", " ") if known else f"reason {reason}"
+
+
 def limits(case: Case, tally: Tally) -> Windows:
-    """What is rejected for the limits lies beyond them."""
+    """What is rejected for the limits lies beyond them; of a lattice, nothing else does."""
     while (window := (yield)) is not None:
         table = window[Kind.REJECT]
-        table = table[table["reason"] == Reason.LIMITS]
-        q = np.asarray(table["q"])
+        q, beyond = np.asarray(table["q"]), table["reason"] == Reason.LIMITS
         within = ((case.lower + case.blur < q) & (q < case.upper - case.blur)).all(axis=1)
+        wrong = beyond & within
+        if case.contract.lattice is not None:
+            wrong |= ~beyond & ((q < case.lower - case.blur) | (case.upper + case.blur < q)).any(1)
+        some, at = table[beyond | wrong], wrong[beyond | wrong]
         tally.look(
-            table, np.asarray(within),
-            lambda i, q=q: f"rejected, but {text(q[i])} is within",  # type: ignore[misc]
+            some, np.asarray(at),
+            lambda i, t=some: (  # type: ignore[misc]
+                f"rejected, but {text(t['q'][i])} is within" if t["reason"][i] == Reason.LIMITS
+                else f"{text(t['q'][i])} is beyond the limits, and that is not said"
+            ),
         )  # fmt: skip
 
 
@@ -85,5 +175,5 @@ def _fill(q: Floats, mine: NDArray[np.bool_], table: Table, numbers: Ints, nodes
     q[rows[right]] = nodes["q"][found[right]]
 
 
-RULES = (rejections, limits)
+RULES = (rejections, reasons, limits)
 """All rules of this file; see `brrt.replay.checks`."""

@@ -10,6 +10,7 @@ from brrt.events import Kind, Stage, Table
 from brrt.planners.contract import Near
 from brrt.replay.checks.case import CLOSE, Case, Grown, folded
 from brrt.replay.checks.neighbours import Neighbours
+from brrt.replay.checks.script import numbered
 from brrt.replay.checks.tally import Tally
 from brrt.replay.ledger import SOUND, Questions
 
@@ -84,12 +85,7 @@ def _pairs(search: Neighbours) -> list[tuple[Ints, Ints, Floats]]:
 
 def _keys(iteration: Ints, tree: Ints, node: Ints, q: Floats) -> NDArray[np.uint64]:
     """Number motions from a node to a place in an iteration; equal ones have equal numbers."""
-    keys = np.zeros(len(q), np.uint64)
-    bits = np.ascontiguousarray(q + 0.0).view(np.uint64).T
-    for part in (iteration, tree, node, *bits):
-        keys = (keys ^ part.astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
-        keys ^= keys >> np.uint64(29)
-    return keys
+    return numbered((iteration, tree, node), q)
 
 
 def _blocked(case: Case) -> NDArray[np.uint64]:

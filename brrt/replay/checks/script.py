@@ -1,6 +1,8 @@
 """A log as a planner acts it out: iteration after iteration, in one table."""
 
+from collections.abc import Iterable
 from collections.abc import Set as AbstractSet
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,7 @@ from numpy.typing import NDArray
 from brrt.events import Events, Kind, Source, Table
 
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 
 def script_dtype(dof: int) -> np.dtype[np.void]:
@@ -24,6 +27,7 @@ _FIELDS = {
     Kind.SAMPLE: {"tree": "tree", "why": "source", "q": "q"},
     Kind.REJECT: {"tree": "tree", "why": "reason", "node": "node", "q": "q"},
     Kind.EDGE: {"tree": "tree", "node": "node", "parent": "parent", "q": "q"},
+    Kind.REWIRE: {"tree": "tree", "node": "node", "parent": "parent"},
     Kind.CONNECT: {"node": "node", "parent": "other"},
 }
 """For each kind, what the script's columns are filled from; the others stay -1."""
@@ -58,16 +62,19 @@ class Scripts:
     Args:
         dof: Numbers in a configuration.
         firsts: Events that an iteration begins with in any case, since other settings rule it.
+        growing: Whether trees grow; else there are no samples, and nothing is acted out.
     """
 
-    def __init__(self, dof: int, firsts: AbstractSet[int]) -> None:
-        self._firsts = firsts
+    def __init__(self, dof: int, firsts: AbstractSet[int], *, growing: bool = True) -> None:
+        self._firsts, self._growing = firsts, growing
         self._window: Events | None = None
         self._held = self._made = np.empty(0, script_dtype(dof))
         self._ended = False
 
     def of(self, window: Events | None) -> Table:
         """Return the iterations that end in a window; at the end of the log, the last one."""
+        if not self._growing:
+            return self._made
         if window is None:
             if not self._ended:
                 self._made, self._ended = self._held, True
@@ -91,6 +98,23 @@ def followed(lines: Table) -> Table:
 def last_where(chosen: NDArray[np.bool_]) -> Ints:
     """For each line the last one up to it that is chosen, or -1, shape (n,)."""
     return np.maximum.accumulate(np.where(chosen, np.arange(len(chosen)), -1))
+
+
+def numbered(parts: Iterable[NDArray[Any]], q: Floats | None = None) -> NDArray[np.uint64]:
+    """One number for each row of what is in columns; rows that are equal have equal numbers.
+
+    Args:
+        parts: Columns of whole numbers, shape (n,) each.
+        q: Configurations besides, shape (n, dof).
+    """
+    columns = [np.asarray(part).astype(np.uint64) for part in parts]
+    if q is not None:
+        columns += list(np.ascontiguousarray(q + 0.0).view(np.uint64).reshape(q.shape).T)
+    keys = np.zeros(len(columns[0]), np.uint64)
+    for column in columns:
+        keys = (keys ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        keys ^= keys >> np.uint64(29)
+    return keys
 
 
 def heads_for_other(lines: Table) -> NDArray[np.bool_]:

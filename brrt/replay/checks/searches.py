@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from brrt.events import Kind, Status, Table
 from brrt.planners.contract import Lattice
 from brrt.replay.checks.case import CLOSE, Case
-from brrt.replay.checks.lattice import indices, lattice_of
+from brrt.replay.checks.lattice import adjacent, indices, lattice_of
+from brrt.replay.checks.log import text
 from brrt.replay.checks.motions import all_clear
 from brrt.replay.checks.tally import Tally
 
@@ -17,6 +18,9 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 _BITS = 21
+
+MOST = 2000
+"""Of more cells than this, so many are looked at, evenly spread over the log."""
 
 
 def _estimates(case: Case, table: Table) -> Floats:
@@ -146,6 +150,61 @@ def nothing_left(case: Case, tally: Tally) -> None:
     )  # fmt: skip
 
 
+def neighbours(case: Case, tally: Tally) -> None:
+    """Of the cells around one that is looked at, those are turned down that cannot be reached.
+
+    All rejections are looked at, and of many cells 2,000.
+    """
+    lattice = lattice_of(case)
+    table, rejects = case.events[Kind.EXPAND], case.events[Kind.REJECT]
+    if lattice is None or not len(table):
+        return
+    places, gone = (indices(case, lattice, some["q"]) for some in (table, rejects))
+    motions = _motions(rejects["node"].astype(np.int64), _keys(gone))
+    again = np.ones(len(rejects), bool)
+    again[np.unique(motions, return_index=True)[1]] = False
+    last = np.searchsorted(table["seq"], rejects["seq"]) - 1
+    q = np.asarray(rejects["q"])
+    off = np.abs(q - case.start - lattice.epsilon * gone).max(axis=1, initial=0)
+    wrong = again | (last < 0) | (table["cell"][last] != rejects["node"])
+    wrong |= ~adjacent(lattice, places[last], gone)
+    wrong |= ~(off <= CLOSE * lattice.epsilon + case.blur)
+    tally.look(
+        rejects, wrong,
+        lambda i: (
+            f"{text(q[i])} is turned down again" if again[i]
+            else f"{text(q[i])} is turned down, no neighbour of the cell just expanded"
+        ),
+    )  # fmt: skip
+    _look_open(case, tally, lattice, np.unique(motions))
+
+
+def _look_open(case: Case, tally: Tally, lattice: Lattice, blocked: NDArray[np.uint64]) -> None:
+    """See that what was not turned down can be reached."""
+    table = case.events[Kind.EXPAND]
+    table = table[: len(table) - case.cut]
+    table = table[np.sort(np.unique(table["cell"], return_index=True)[1])]
+    # Where the goal is in reach nobody looks around.
+    far = case.distance(np.asarray(table["q"]), case.goal[None])
+    table = table[~case.at_most(far, lattice.max_move)]
+    if not len(table):
+        return
+    table = table[np.linspace(0, len(table) - 1, min(MOST, len(table))).astype(np.int64)]
+    steps = np.array([s for s in product((-1, 0, 1), repeat=case.dof) if any(s)])
+    if not lattice.diagonals:
+        steps = steps[np.abs(steps).sum(axis=1) == 1]
+    around = (indices(case, lattice, table["q"])[:, None] + steps).reshape(-1, case.dof)
+    some = np.repeat(table, len(steps))
+    is_open = ~np.isin(_motions(some["cell"].astype(np.int64), _keys(around)), blocked)
+    some, to = some[is_open], case.start + lattice.epsilon * around[is_open]
+    out = ~((case.lower - case.blur <= to) & (to <= case.upper + case.blur)).all(axis=1)
+    hit = out | (case.blocked(np.asarray(some["q"]), to) >= 0)
+    tally.look(
+        some, hit,
+        lambda i: f"cell {some['cell'][i]}: {text(to[i])} is not turned down, but out of reach",
+    )  # fmt: skip
+
+
 def goal_taken(case: Case, tally: Tally) -> None:
     """Where the goal is within a straight free move of a cell, the search ends there."""
     lattice, table = lattice_of(case), case.events[Kind.EXPAND]
@@ -172,5 +231,5 @@ def goal_taken(case: Case, tally: Tally) -> None:
     )  # fmt: skip
 
 
-RULES = (best_first, shortest_ways, nothing_left, goal_taken)
+RULES = (neighbours, best_first, shortest_ways, nothing_left, goal_taken)
 """All rules of this file; see `brrt.replay.checks`."""

@@ -14,6 +14,10 @@ from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions
 Floats = NDArray[np.float64]
 
 
+_EDGE = "the edge to node", "node"
+"""What is said of a motion that is not free, and the field with its number."""
+
+
 def nodes(case: Case, tally: Tally) -> None:
     """Nodes join a tree as 0, 1, 2 ... below a node that is there."""
     for tree in case.trees:
@@ -66,8 +70,8 @@ def edge_lengths(case: Case, tally: Tally) -> None:
             wrong &= ~sees[case.stretch(edges)] | (np.asarray(edges["q"]) != case.goal).any(axis=1)
             tally.look(
                 edges[there], wrong[there],
-                lambda i, n=length[there], s=step[there]: (  # type: ignore[misc]
-                    f"edge of {n[i]:.12g}; the step is {s[i]:.12g}"
+                lambda i, e=edges[there], n=length[there], s=step[there]: (  # type: ignore[misc]
+                    f"the edge to node {e['node'][i]} is {n[i]:.12g} long; the step is {s[i]:.12g}"
                 ),
             )  # fmt: skip
 
@@ -94,7 +98,9 @@ def edges_free(case: Case, tally: Tally) -> None:
     for tree in case.trees:
         q = np.asarray(tree.edges["q"])
         for edges, _ in _sound_edges(tree):
-            case.look_free(tally, edges, q[edges["parent"]], np.asarray(edges["q"]), "edge")
+            case.look_free(
+                tally, edges, q[edges["parent"]], np.asarray(edges["q"]), "the edge to node", "node"
+            )
 
 
 def rewires(case: Case, tally: Tally) -> None:
@@ -167,7 +173,9 @@ def rewires_free(case: Case, tally: Tally) -> None:
     for tree in case.trees:
         sound = tree.of_rewires(tree.ledger.verdict == SOUND)
         table, q = tree.rewires[sound], np.asarray(tree.edges["q"])
-        case.look_free(tally, table, q[table["parent"]], q[table["node"]], "edge")
+        case.look_free(
+            tally, table, q[table["parent"]], q[table["node"]], "the edge to node", "node"
+        )
 
 
 def links(case: Case, tally: Tally) -> None:

@@ -3,16 +3,17 @@
 from dataclasses import dataclass
 from typing import Any
 
-from brrt.replay.explain.advice import Advice, advise
+from brrt.replay.explain.advice import advise
 from brrt.replay.explain.facts import Facts, facts
 from brrt.replay.explain.gather import Gather
-from brrt.replay.explain.tell import Row, rows
+from brrt.replay.explain.proposal import Advice
+from brrt.replay.explain.tell import Row, rows, table
 from brrt.replay.moment import Moment
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What a run was like, and what to try.
+    """What a run was like, and what to try; as text it is what `brrt explain` prints.
 
     Attributes:
         facts: Figures.
@@ -26,13 +27,28 @@ class Explanation:
         """Tell the facts in words: names with what there is to say."""
         return list(rows(self.facts))
 
+    def table(self) -> list[str]:
+        """Write the facts for a screen of 80 columns, in lines."""
+        return list(table(self.rows()))
+
+    def __str__(self) -> str:
+        """Return what `brrt explain` prints."""
+        lines = self.table()
+        for i, advice in enumerate(self.advice):
+            lines += ["", *advice.reason(i + 1), *advice.typed()]
+        return "\n".join(lines)
+
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain numbers, texts, lists and dicts."""
         return {**self.facts.as_dict(), "advice": [each.as_dict() for each in self.advice]}
 
 
-def explain(moment: Moment) -> Explanation:
+def explain(moment: Moment, file: str = "") -> Explanation:
     """Explain a run as it stood at an instant, in one pass over its events.
+
+    Args:
+        moment: The run.
+        file: The recording, as commands that are advised name it; by default its own name.
 
     Raises:
         BrrtError: The manifest's query is of no use in its world.
@@ -40,7 +56,7 @@ def explain(moment: Moment) -> Explanation:
     robot = moment.manifest.make_robot().settled(moment.world)
     gather = Gather(moment.manifest, robot)
     moment.feed(gather)
-    found = facts(moment.manifest, moment.world, robot, gather)
+    found = facts(moment, file or moment.name, robot, gather)
     return Explanation(found, advise(found))
 
 

@@ -1,4 +1,4 @@
-"""A scenario as the command that runs it."""
+"""Settings as the words of the command that plans by them."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -9,28 +9,40 @@ from brrt.scenario import Scenario
 
 def command(scenario: Scenario, out: str = "next.mcap") -> str:
     """Write a scenario as the command that runs it, and records to `out`."""
-    words = ["brrt", "plan", *_options(scenario.as_dict(), Scenario().as_dict())]
-    for name, value in scenario.params.items():
+    return shlex.join([*plan_words(scenario), "--out", out])
+
+
+def plan_words(scenario: Scenario) -> list[str]:
+    """Write a scenario as the command that runs it, but for what it writes."""
+    values, usual = scenario.as_dict(), Scenario().as_dict()
+    given = {
+        name: values[name]
+        for name in values
+        if name in ("world", "seed") or values[name] not in (None, usual[name])
+    }
+    return ["brrt", "plan", *setting_words(given, scenario.params)]
+
+
+def setting_words(settings: Mapping[str, Any], params: Mapping[str, Any]) -> list[str]:
+    """Write fields of a scenario, and parameters of its planner, as options."""
+    words = list(_options(settings))
+    for name, value in params.items():
         if value is not None:
             words += ["--param", f"{name}={text(value)}"]
-    return shlex.join([*words, "--out", out])
+    return words
 
 
-def _options(values: Mapping[str, Any], usual: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the options for what is not as usual; the seed always, and the world."""
-    names = ("world", "robot", "planner", "start", "goal", "seed", "iterations", "time",
-             "shortcuts", "max_move", "deadline")  # fmt: skip
-    for name in names:
-        value = values[name]
-        if value is not None and (value != usual[name] or name in ("world", "seed")):
-            given = value if isinstance(value, str) else text(value)
+def _options(values: Mapping[str, Any]) -> Iterator[str]:
+    for name in ("world", "robot", "planner", "start", "goal", "seed", "iterations", "time",
+                 "shortcuts", "max_move", "deadline"):  # fmt: skip
+        if name in values:
+            given = text(values[name])
             option = f"--{name.replace('_', '-')}"
             # A value that begins with a minus would be taken for an option.
             yield from [f"{option}={given}"] if given.startswith("-") else [option, given]
-    if not values["smooth"]:
-        yield "--no-smooth"
-    if values["execute"]:
-        yield "--execute"
+    for name in ("smooth", "execute"):
+        if name in values:
+            yield f"--{name}" if values[name] else f"--no-{name}"
 
 
 def text(value: Any) -> str:

@@ -1,6 +1,6 @@
 """All that an explanation knows: figures, each computed from the recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from brrt.planners import PLANNERS
 from brrt.planners.contract import Contract
 from brrt.replay.account import choice_name
 from brrt.replay.explain.gather import FAILED, Gather
-from brrt.replay.explain.places import Blocker, Coverage, Gap, Narrow, Places, Spot
+from brrt.replay.explain.places import Blocker, Coverage, Gap, Places, Spot
+from brrt.replay.explain.way import Narrow, Way, Ways
+from brrt.replay.moment import Moment
 from brrt.replay.story import as_plain
 from brrt.robots import Robot
 from brrt.scenario import Scenario
@@ -108,10 +110,13 @@ class Facts:
 
     Attributes:
         manifest: The run's.
+        file: The recording, as the command line takes it; empty where it is in no file.
+        ended: Whether the recording is told to its end, and not to an instant before.
         contract: What its planner promises, as its step; None where it is not known here.
-        extent: The longest side of the world's bounds.
+        sides: Those of the world's bounds.
         figures: Those that `brrt replay --json` prints.
         tenths: The run's course.
+        trees: Numbers of the trees.
         accepted: Extensions that added a node, or first expansions of cells.
         failed: Extensions that added none, or further expansions of cells.
         reasons: Rejections by reason, most frequent first.
@@ -121,18 +126,19 @@ class Facts:
         approach: How near to it the run came.
         gap: How near two trees came to each other.
         coverage: How much of the free space was reached.
-        connected: Whether there is a way for a point: True and False are proven.
-        way: What that rests on.
-        narrow: The narrowest place on it.
+        way: Whether there is one from start to goal, and how wide it is.
         progress: The paths.
         cells: What a search on a lattice did; empty for others.
     """
 
     manifest: Manifest
+    file: str
+    ended: bool
     contract: Contract | None
-    extent: float
+    sides: list[float]
     figures: dict[str, Any]
     tenths: list[Tenth]
+    trees: list[int]
     accepted: int
     failed: int
     reasons: dict[str, int]
@@ -142,9 +148,7 @@ class Facts:
     approach: Approach | None
     gap: Gap | None
     coverage: Coverage | None
-    connected: bool | None
-    way: str
-    narrow: Narrow | None
+    way: Way
     progress: Progress | None
     cells: dict[str, Any]
 
@@ -152,6 +156,21 @@ class Facts:
     def scenario(self) -> Scenario:
         """What was run."""
         return self.manifest.scenario
+
+    @property
+    def extent(self) -> float:
+        """The longest side of the world's bounds."""
+        return max(self.sides)
+
+    @property
+    def narrow(self) -> Narrow | None:
+        """The narrowest place on the widest way, where one was found."""
+        return self.way.narrow
+
+    @property
+    def cut(self) -> bool:
+        """Whether planning neither ended nor was it asked how it stood before its end."""
+        return self.figures["status"] == "running" and self.ended
 
     @property
     def acceptance(self) -> float | None:
@@ -162,33 +181,38 @@ class Facts:
     def as_dict(self) -> dict[str, Any]:
         """Return all but the manifest as plain numbers, texts, lists and dicts."""
         plain: dict[str, Any] = as_plain(self)
-        del plain["manifest"]
-        return {**plain, "acceptance": self.acceptance}
+        for name in ("manifest", "file", "ended"):
+            del plain[name]
+        way = plain.pop("way")
+        way["way"] = way.pop("reason")
+        return {**plain, **way, "extent": self.extent, "acceptance": self.acceptance}
 
 
-def facts(manifest: Manifest, world: World, robot: Robot, gather: Gather) -> Facts:
+def facts(moment: Moment, file: str, robot: Robot, gather: Gather) -> Facts:
     """Compute everything.
 
     Args:
-        manifest: The run's.
-        world: The run's.
+        moment: The run as it stood.
+        file: The recording, as the command line takes it; empty where it is in no file.
         robot: What moves, settled in the world.
         gather: What the log says.
     """
+    manifest, world = moment.manifest, moment.world
     places = Places(world, robot, gather)
     start, goal = np.array(manifest.start), np.array(manifest.goal)
     figures = gather.metrics.as_dict()
     rejects = gather.rejects.rows()
     ends = gather.origins(rejects), np.asarray(rejects["q"])
-    connected, way, narrow = places.narrow(start, goal)
-    if figures["solved"] and connected is None:
-        connected, way = True, f"the run found it; {way}"
+    contract = _contract(manifest, world)
     return Facts(
         manifest=manifest,
-        contract=_contract(manifest, world),
-        extent=world.extent,
+        file=file,
+        ended=not moment.limits,
+        contract=contract,
+        sides=(world.upper - world.lower).tolist(),
         figures=figures,
         tenths=_tenths(gather, figures["iterations"], manifest.scenario.clock == "logical"),
+        trees=gather.trees,
         accepted=int(gather.spans.sums[:, 0].sum()),
         failed=int(gather.spans.sums[:, 1].sum()),
         reasons={choice_name(Reason, reason): n for reason, n in gather.reasons.most_common()},
@@ -198,9 +222,7 @@ def facts(manifest: Manifest, world: World, robot: Robot, gather: Gather) -> Fac
         approach=_approach(gather, places, start, goal, robot, figures["iterations"]),
         gap=places.gap() if not figures["solved"] else None,
         coverage=places.coverage(*_reached(gather), figures["iterations"]),
-        connected=connected,
-        way=way,
-        narrow=narrow,
+        way=_way(Ways(world, robot, gather), start, goal, contract, solved=figures["solved"]),
         progress=_progress(gather, figures["iterations"]),
         cells=gather.cells.as_dict(),
     )
@@ -210,6 +232,14 @@ def _contract(manifest: Manifest, world: World) -> Contract | None:
     if manifest.scenario.planner not in PLANNERS:
         return None
     return manifest.scenario.make_planner().contract(manifest.make_problem(world))
+
+
+def _way(
+    ways: Ways, start: Floats, goal: Floats, contract: Contract | None, *, solved: bool
+) -> Way:
+    way = ways.find(start, goal, None if contract is None else contract.step)
+    # That there is one is proven by a run that took it.
+    return replace(way, connected=True) if solved else way
 
 
 def _tenths(gather: Gather, last: int, logical: bool) -> list[Tenth]:

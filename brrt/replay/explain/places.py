@@ -1,4 +1,4 @@
-"""Where things happened: what is in the way, what was reached, how narrow the way is."""
+"""Where things happened: what is in the way, what was reached, how near trees came."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from brrt.replay.checks.motions import Obstacles, first_hits
 from brrt.replay.explain.gather import Gather
 from brrt.robots import Robot
-from brrt.worlds.passage import narrowest
 from brrt.worlds.raster import Lattice
-from brrt.worlds.survey import connected, covered
+from brrt.worlds.survey import covered
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -65,33 +64,15 @@ class Coverage:
         share: Share of these with a node, or an expanded cell, in them.
         late: Share of the reached ones that were first reached in the run's last third.
         drought: Share of the run in the longest stretch in which none was reached first.
+        single: Share of the reached ones with a single node in them. As long again, a run reaches
+            about as many new ones as these (Good and Toulmin 1956): few, where it is done.
     """
 
     cells: int
     share: float
     late: float
     drought: float
-
-
-@dataclass(frozen=True, slots=True)
-class Narrow:
-    """The narrowest place on the widest way from start to goal; see `brrt.worlds.passage`.
-
-    Attributes:
-        low: Least width of it.
-        high: Greatest width of it.
-        q: Where it is.
-        parts: Whether it parts start and goal; else one of these is where there is least room.
-        behind: Nodes that are behind it, seen from the start.
-        through: Iteration in which the first of them joined; None without one.
-    """
-
-    low: float
-    high: float
-    q: list[float]
-    parts: bool
-    behind: int
-    through: int | None
+    single: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +135,7 @@ class Places:
         if not there.any():
             return None
         middles = (self._robot.places(a[there]) + self._robot.places(b[there])) / 2
-        lattice = self._coarse()
+        lattice = coarse(self._world)
         cell = np.ravel_multi_index(tuple(lattice.index(middles).T), lattice.shape)
         counts = np.bincount(cell, minlength=int(np.prod(lattice.shape)))
         most = np.array(np.unravel_index(int(counts.argmax()), lattice.shape))
@@ -171,12 +152,13 @@ class Places:
         """
         if not self.has_position or not len(q):
             return None
-        lattice = self._coarse()
+        lattice = coarse(self._world)
         n = int(np.prod(lattice.shape))
         cell = np.ravel_multi_index(tuple(lattice.index(self._robot.places(q)).T), lattice.shape)
         first = np.full(n, np.iinfo(np.int64).max)
         np.minimum.at(first, cell, iteration)
-        reached = np.bincount(cell, minlength=n) > 0
+        nodes = np.bincount(cell, minlength=n)
+        reached = nodes > 0
         index = np.stack(np.unravel_index(np.arange(n), lattice.shape), axis=1)
         rng = np.random.default_rng(0)
         inside = index[:, None] + rng.random((n, _POINTS, index.shape[1]))
@@ -185,27 +167,8 @@ class Places:
         news = np.sort(first[reached])
         late = float((news > last * 2 / 3).mean())
         drought = float(np.diff(news, prepend=0, append=last).max() / max(last, 1))
-        return Coverage(int(free.sum()), float(reached.sum() / free.sum()), late, drought)
-
-    def narrow(self, start: Floats, goal: Floats) -> tuple[bool | None, str, Narrow | None]:
-        """Say whether there is a way for a point, on what that rests, and how narrow it is."""
-        if not self.has_position:
-            return None, "not looked for: this robot has no place of its own in the world", None
-        ends = self._robot.places(np.stack([start, goal]))
-        found = narrowest(self._world, *ends)
-        if found is None:
-            way = connected(self._world, *ends)
-            return way.connected, way.reason, None
-        behind, through, parts = 0, None, bool(found.behind.any())
-        for tree in self._gather.trees[:1]:
-            passed = found.passed(self._robot.places(self._gather.nodes(tree)))
-            behind = int(passed.sum())
-            through = int(self._gather.iterations(tree)[passed][0]) if behind else None
-        if not self._gather.trees:
-            behind = int(found.passed(self._robot.places(self._gather.cells.q)).sum())
-        reason = f"free cells of {found.cell:.3g} lead to the goal"
-        place = found.place.tolist()
-        return True, reason, Narrow(found.low, found.high, place, parts, behind, through)
+        single = float((nodes[reached] == 1).mean())
+        return Coverage(int(free.sum()), float(reached.sum() / free.sum()), late, drought, single)
 
     def gap(self) -> Gap | None:
         """Find two nodes of two trees that are close; None where there are no two trees.
@@ -226,8 +189,10 @@ class Places:
             a = one[int(self._robot.distance(one, b).argmin())]
         return Gap(far, a.tolist(), b.tolist(), self.in_the_way(a, b))
 
-    def _coarse(self) -> Lattice:
-        return Lattice.over(self._world.lower, self._world.upper, _CELLS[self._world.dim])
+
+def coarse(world: World) -> Lattice:
+    """Return the coarse cells in which shares of the free space are counted."""
+    return Lattice.over(world.lower, world.upper, _CELLS[world.dim])
 
 
 def _numbers(values: Floats) -> str:

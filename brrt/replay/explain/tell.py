@@ -1,16 +1,24 @@
 """An explanation in words: rows of a name and what there is to say, for a screen of 80 columns."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from textwrap import wrap
 
 from brrt.replay.explain.facts import Facts
+from brrt.replay.explain.way import Narrow, at_least
 
 Row = tuple[str, str]
+
+WIDTH = 79
+"""Columns that are written to: the last one of 80 stays free."""
 
 
 def rows(f: Facts) -> Iterator[Row]:
     """Tell the facts, the outcome first."""
     scenario = f.scenario
     yield "run", f"{scenario.planner} · {scenario.robot} · {scenario.world} · seed {scenario.seed}"
+    for branch, (_, after) in zip(f.manifest.branches, f.manifest.stretches[1:], strict=True):
+        file = branch.file or "another run"
+        yield "from", f"{file}, behind iteration {branch.iteration:,}: {branch.told(after)}"
     yield "outcome", _outcome(f)
     yield "grown", _grown(f)
     yield from _course(f)
@@ -25,10 +33,15 @@ def rows(f: Facts) -> Iterator[Row]:
 def _outcome(f: Facts) -> str:
     figures = f.figures
     time = "" if figures["plan_time_s"] is None else f" in {_seconds(figures['plan_time_s'])}"
-    effort = f"{figures['iterations']:,} iterations{time}"
+    effort = f"{counted(figures['iterations'], 'iteration')}{time}"
+    if f.cut:
+        found = f"with a path of {_g(figures['path_cost'])}" if figures["solved"] else "not solved"
+        return f"cut short, {found}: the recording breaks off after {effort}"
     if figures["solved"]:
         ended = "" if figures["status"] == "solved" else f", ended by: {figures['status']}"
         return f"solved, a path of {_g(figures['path_cost'])} after {effort}{ended}"
+    if figures["status"] == "running":
+        return f"not solved yet after {effort}"
     return f"not solved: {figures['status']} after {effort}"
 
 
@@ -38,10 +51,12 @@ def _grown(f: Facts) -> str:
         reached = f"; in {f.coverage.share:.0%} of {f.coverage.cells:,} free cells of the world"
     if f.cells:
         again = f.cells["expansions"] - f.cells["cells"]
-        return f"{f.cells['cells']:,} cells expanded, and {again:,} times one again{reached}"
+        return f"{counted(f.cells['cells'], 'cell')} expanded, and {again:,} again{reached}"
     tried = f.accepted + f.failed
-    accepted = "" if f.acceptance is None else f" from {tried:,} extensions, {f.acceptance:.0%}"
-    return f"{f.figures['nodes']:,} nodes{accepted}{reached}"
+    accepted = ""
+    if f.acceptance is not None:
+        accepted = f" from {counted(tried, 'extension')}, {f.acceptance:.0%}"
+    return f"{counted(f.figures['nodes'], 'node')}{accepted}{reached}"
 
 
 def _course(f: Facts) -> Iterator[Row]:
@@ -84,51 +99,61 @@ def _rejected(f: Facts) -> Iterator[Row]:
         yield "by", ", ".join(f"{each.name} {each.share:.0%}" for each in f.blockers)
     if f.spot is not None and f.spot.share >= 0.05:
         sides = " x ".join(f"{side:.3g}" for side in f.spot.sides)
-        yield "most", f"{f.spot.share:.0%} within {sides} around {_place(f.spot.q)}"
+        yield "most", f"{f.spot.share:.0%} within {sides} around {place(f.spot.q)}"
 
 
 def _way(f: Facts) -> str:
-    if f.narrow is None:
-        known = {True: "there is one", False: "there is none", None: "unknown"}[f.connected]
-        return f"{known}: {f.way}"
-    body = "" if f.scenario.robot.partition(":")[0] == "point" else ", for a point"
-    width = f"{max(f.narrow.low, 0):.3g} to {f.narrow.high:.3g} wide{body}"
-    place = f"at {_place(f.narrow.q)}"
-    if not f.narrow.parts:
-        return f"the widest one is {width} where it is narrowest, {place}"
-    what = "cells" if f.cells else "nodes"
-    passed = (
-        f"{f.narrow.behind:,} {what} lie behind it"
-        if f.narrow.behind
-        else f"no {what[:-1]} got through"
-    )
-    when = "" if f.narrow.through is None else f", from iteration {f.narrow.through:,} on"
-    return f"the widest one is {width} where it is narrowest, {place}; {passed}{when}"
+    solved, narrow = f.figures["solved"], f.narrow
+    if narrow is None:
+        if solved and f.way.widest is not None:
+            return f"there is one: the run found it, but {f.way.reason}"
+        known = {True: "there is one", False: "there is none", None: "unknown"}[f.way.connected]
+        return f"{known}: {'the run found it' if solved else f.way.reason}"
+    width = f"{max(narrow.low, 0):.3g} to {narrow.high:.3g} wide where it is narrowest"
+    told = [f"the widest one is {width}, at {place(narrow.q)}"]
+    if f.way.body and narrow.low < f.way.body:
+        told.append(f"this body is at least {at_least(f.way.body)} wide")
+    if solved and narrow.crossed is not None:
+        way = "leads through there" if narrow.crossed else "takes another way"
+        told.append(f"the path {way}")
+    if narrow.parts and not (solved and len(f.trees) > 1):
+        told.append(_passed(narrow, "cell" if f.cells else "node"))
+    return "; ".join(told)
+
+
+def _passed(narrow: Narrow, what: str) -> str:
+    if not narrow.behind:
+        near = "" if narrow.near else f", none came within {narrow.reach:.3g} of it"
+        return f"no {what} got through{near}"
+    when = "" if narrow.through is None else f", from iteration {narrow.through:,} on"
+    lie = "lies" if narrow.behind == 1 else "lie"
+    return f"{counted(narrow.behind, what)} {lie} behind it{when}"
 
 
 def _goal(f: Facts) -> Iterator[Row]:
     near = f.approach
-    if near is not None and near.far > 0:
+    if near is not None and near.far > 0 and not f.figures["solved"]:
         what = "cell" if f.cells else "node"
         hit = f"; {near.hit} is on the straight way" if near.hit else ""
         yield (
             "nearest",
             (
-                f"{what} {near.node:,} at {_place(near.q)}, {_g(near.far)} from the goal "
+                f"{what} {near.node:,} at {place(near.q)}, {_g(near.far)} from the goal "
                 f"(the start: {_g(near.start)}); none nearer in the last {near.since:.0%}{hit}"
             ),
         )
     if f.gap is not None:
         hit = f"; between them {f.gap.hit}" if f.gap.hit else ""
-        ends = f"{_place(f.gap.q)} and {_place(f.gap.other)}"
+        ends = f"{place(f.gap.q)} and {place(f.gap.other)}"
         yield "gap", f"the trees are at most {_g(f.gap.far)} apart, at {ends}{hit}"
     goals = f.goals
     if goals is not None:
         told = []
         if goals.drawn:
-            told.append(f"drawn {goals.drawn:,} times, rejected {goals.failed:,} times")
+            drawn, failed = (counted(n, "time") for n in (goals.drawn, goals.failed))
+            told.append(f"drawn {drawn}, rejected {failed}")
         if goals.blocked:
-            told.append(f"out of reach by the last motion {goals.blocked:,} times")
+            told.append(f"out of reach by the last motion {counted(goals.blocked, 'time')}")
         by = ", ".join(f"{each.name} {each.share:.0%}" for each in goals.blockers[:2])
         yield "goal", "; ".join(told) + (f"; by {by}" if by else "")
 
@@ -162,15 +187,15 @@ def _cells(f: Facts) -> Iterator[Row]:
         "moves",
         (
             f"{cells['moves']:,}; each cell was entered {cells['moves_per_cell']:.3g} times, "
-            f"that at {_place(busiest['q'])} {busiest['visits']:,} times"
+            f"that at {place(busiest['q'])} {counted(busiest['visits'], 'time')}"
         ),
     )
     if deepest["learnt"] > 0:
         yield (
             "learnt",
             (
-                f"{cells['raised']:,} estimates rose, that at {_place(deepest['q'])} most: by "
-                f"{_g(deepest['learnt'])} to {_g(deepest['estimate'])}"
+                f"{counted(cells['raised'], 'estimate')} rose, that at {place(deepest['q'])} "
+                f"most: by {_g(deepest['learnt'])} to {_g(deepest['estimate'])}"
             ),
         )
 
@@ -180,10 +205,12 @@ def _driven(f: Facts) -> Iterator[Row]:
     if figures["max_move_time_s"] is None:
         return
     misses, deadline = figures["deadline_misses"], f.scenario.deadline
-    late = f"{misses:,} later than {deadline:g} s, {figures['stays']:,} deadlines stood still"
+    stood = counted(figures["stays"], "deadline")
+    late = f"{misses:,} later than {deadline:g} s, {stood} stood still"
     yield (
         "driven",
-        f"{figures['moves']:,} moves, the slowest in {_seconds(figures['max_move_time_s'])}; "
+        f"{counted(figures['moves'], 'move')}, the slowest in "
+        f"{_seconds(figures['max_move_time_s'])}; "
         + (late if misses else f"all within {deadline:g} s"),
     )
 
@@ -199,5 +226,20 @@ def _g(value: float | None) -> str:
     return "none" if value is None else f"{value:.5g}"
 
 
-def _place(q: list[float]) -> str:
+def place(q: list[float]) -> str:
+    """Write a configuration, or a place."""
     return "(" + ", ".join(f"{x:.4g}" for x in q) + ")"
+
+
+def counted(n: int, one: str) -> str:
+    """Write a number of things: `1 node`, `1,200 nodes`."""
+    return f"{n:,} {one if n == 1 else one + 's'}"
+
+
+def table(found: Sequence[Row]) -> Iterator[str]:
+    """Yield the lines of rows for a screen of 80 columns."""
+    width = max(len(name) for name, _ in found) + 2
+    for name, text in found:
+        lines = wrap(text, WIDTH - width, break_on_hyphens=False)
+        for i, line in enumerate(lines):
+            yield ("" if i else name).ljust(width) + line

@@ -1,0 +1,161 @@
+"""What to try after a run that found no path: rules, each from figures to a command."""
+
+import math
+
+from brrt.replay.explain.command import text
+from brrt.replay.explain.facts import Facts
+from brrt.replay.explain.proposal import Advice, change, further, go_on, look, recording, rounded
+from brrt.replay.explain.signs import grows, is_young, limited, step_of, stuck, width_of
+from brrt.replay.explain.tell import counted
+from brrt.replay.explain.way import at_least, at_most
+
+ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
+"""What grows a second tree from the goal, instead of each planner."""
+
+_ENOUGH = 100
+"""Extensions from which on a run's course means anything."""
+
+_SPREADING = 0.15
+"""The same of a run that still spreads: it is not stuck anywhere."""
+
+
+def no_way(f: Facts) -> Advice | None:
+    """There is no way: look at the map before anything else."""
+    if f.way.connected is not False:
+        return None
+    why = f"there is no way from start to goal: {f.way.reason}"
+    return look(why, "worlds", "show", f.scenario.world, *_ends(f))
+
+
+def too_wide(f: Facts) -> Advice | None:
+    """No way is wide enough for the body: searching on would not help."""
+    if not f.way.too_narrow or f.way.widest is None:
+        return None
+    why = (
+        f"no pose of this body fits through: it is at least {at_least(f.way.body)} wide, the "
+        f"widest way at most {at_most(f.way.widest)}"
+    )
+    return look(why, "plot", recording(f), suffix=".png")
+
+
+def small_cells(f: Facts) -> Advice | None:
+    """The lattice shows no path: its cells are too large for the passage, or for a narrower one."""
+    lattice = None if f.contract is None else f.contract.lattice
+    if lattice is None or f.figures["status"] != "no path":
+        return None
+    cells = f"cells of {lattice.epsilon:g}"
+    if f.narrow is None:
+        why = f"{cells} show no path, and {f.way.reason}"
+        return change(f, why, params={"epsilon": lattice.epsilon / 4})
+    if lattice.epsilon <= f.narrow.low / 4:
+        why = f"{cells} show no path, though the passage is {width_of(f)} wide"
+        return change(f, why, params={"epsilon": lattice.epsilon / 2})
+    epsilon = rounded(max(f.narrow.low, f.narrow.high / 4) / 4)
+    why = f"{cells} are large for a passage {width_of(f)} wide"
+    return change(f, why, params={"epsilon": epsilon})
+
+
+def goal_bias(f: Facts) -> Advice | None:
+    """The goal was never drawn, or most draws of it were in vain."""
+    bias = f.scenario.settings().get("goal_bias")
+    if bias is None or f.scenario.planner not in ONE_TREE:
+        return None
+    if bias == 0:
+        return change(f, "goal bias 0 never draws the goal", params={"goal_bias": 0.05})
+    goals, samples = f.goals, f.figures["samples"]
+    if goals is None or bias <= 0.2 or not samples or goals.failed < 0.9 * goals.drawn:
+        return None
+    by = f", most by {goals.blockers[0].name}" if goals.blockers else ""
+    drawn = counted(goals.drawn, "goal")
+    why = f"goal bias {bias:g} drew {drawn}, and {goals.failed:,} of them in vain{by}"
+    return change(f, why, params={"goal_bias": 0.05})
+
+
+def young(f: Facts) -> Advice | None:
+    """The tree had hardly begun to spread when the budget ended."""
+    if not limited(f) or not is_young(f) or f.coverage is None:
+        return None
+    c = f.coverage
+    times = min(100, max(10, round(8 / c.share)))
+    why = (
+        f"{counted(f.figures['iterations'], 'iteration')} reached {c.share:.0%} of the free space, "
+        f"and {c.single:.0%} of that with a single node: the tree was still spreading"
+    )
+    return further(f, why, times)
+
+
+def second_tree(f: Facts) -> Advice | None:
+    """One tree stopped growing in front of the passage, or came no nearer for half of the run."""
+    planner = ONE_TREE.get(f.scenario.planner)
+    if planner is None or f.approach is None or f.accepted + f.failed < _ENOUGH:
+        return None
+    if f.coverage is not None and f.coverage.late > _SPREADING:
+        return None
+    if is_young(f) and not stuck(f):
+        return None
+    if stuck(f):
+        why = "no node got through the passage; a tree from the goal meets it from behind"
+    elif f.approach.since >= 0.5:
+        why = f"no node came nearer to the goal in the last {f.approach.since:.0%} of the run"
+    else:
+        return None
+    step = f.scenario.params.get("step")
+    return change(f, why, planner=planner, params={} if step is None else {"step": step})
+
+
+def long_step(f: Facts) -> Advice | None:
+    """Steps are longer than the passage is wide, and none got through it."""
+    step = step_of(f)
+    if step is None or not stuck(f) or f.narrow is None or step <= f.narrow.high:
+        return None
+    why = f"step {step:g} is longer than the passage {width_of(f)} wide, and no node got through"
+    return change(f, why, params={"step": rounded(max(f.narrow.low, f.narrow.high / 4))})
+
+
+def unseen(f: Facts) -> Advice | None:
+    """Cells were too coarse to tell whether there is a way: only a search could."""
+    if not limited(f) or f.way.connected is not None or f.way.widest is None:
+        return None
+    return further(f, f"{f.way.reason}: a longer search may find it", 50)
+
+
+def all_cells(f: Facts) -> Advice | None:
+    """The search for a shortest path on a lattice has its end: each cell is expanded once."""
+    lattice = None if f.contract is None else f.contract.lattice
+    if lattice is None or lattice.lookahead is not None or f.figures["status"] != "iteration limit":
+        return None
+    cells = math.prod(int(side / lattice.epsilon) + 1 for side in f.sides)
+    if cells <= f.figures["iterations"]:
+        return None
+    why = (
+        f"{counted(f.figures['iterations'], 'cell')} were expanded; the bounds hold {cells:,}, and "
+        "none is expanded twice"
+    )
+    return go_on(f, why, iterations=cells)
+
+
+def longer(f: Facts) -> Advice | None:
+    """The run was still getting somewhere when its budget ended."""
+    if not limited(f):
+        return None
+    if grows(f) and f.coverage is not None:
+        why = f"{f.coverage.late:.0%} of what was reached came in the run's last third"
+        times = min(100, max(4, round(2 / f.coverage.share)))
+    elif f.approach is not None and f.approach.since <= 0.3:
+        why = f"it came nearer to the goal until the last {f.approach.since:.0%} of the run"
+        times = 10
+    else:
+        return None
+    return further(f, f"{why}: it was still growing", times)
+
+
+def anything(f: Facts) -> Advice | None:
+    """The budget ended the run, and nothing else has anything to say."""
+    if not limited(f):
+        return None
+    return further(f, "the budget ended the run, and no figure tells that it was stuck", 10)
+
+
+def _ends(f: Facts) -> list[str]:
+    names = [name for name in ("start", "goal") if getattr(f.scenario, name) is not None]
+    return [f"--{name}={text(getattr(f.manifest, name))}" for name in names]

@@ -1,0 +1,41 @@
+"""Signs that rules go by: what figures say of a run as a whole."""
+
+from brrt.replay.explain.facts import Facts
+
+_GROWING = 0.05
+"""Of what was reached, the part that must have come in the last third of a run that grows."""
+
+_FRESH = 0.2
+"""Of the cells that were reached, the part with a single node in a tree that is young."""
+
+
+def limited(f: Facts) -> bool:
+    """Whether the budget ended the run."""
+    return f.figures["status"] in ("iteration limit", "time limit")
+
+
+def is_young(f: Facts) -> bool:
+    """Whether the tree had reached little, and much of that by a single node."""
+    c = f.coverage
+    return c is not None and not f.cells and c.share < 0.5 and c.single >= _FRESH
+
+
+def stuck(f: Facts) -> bool:
+    """Whether a passage parts start and goal, nodes came near, and none is behind it."""
+    return f.narrow is not None and f.narrow.parts and f.narrow.near > 0 and not f.narrow.behind
+
+
+def grows(f: Facts) -> bool:
+    """Whether the run still reached new space in its last third."""
+    return f.coverage is not None and f.coverage.late >= _GROWING
+
+
+def step_of(f: Facts) -> float | None:
+    """Return the longest edge that the planner makes; None where it makes none."""
+    return None if f.contract is None else f.contract.step
+
+
+def width_of(f: Facts) -> str:
+    """Write how wide the narrowest place is, where one is known."""
+    assert f.narrow is not None  # noqa: S101 - the caller's
+    return f"{max(f.narrow.low, 0):.3g} to {f.narrow.high:.3g}"
