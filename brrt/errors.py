@@ -12,6 +12,21 @@ class RecordingError(BrrtError):
     """A recording cannot be written, or cannot be read in whole."""
 
 
+class WriteError(RecordingError):
+    """A recording cannot be written, or not to its end.
+
+    Args:
+        path: The file.
+        reason: What the system says of it.
+        left: What there is of the file all the same; nothing by default.
+    """
+
+    def __init__(self, path: object, reason: str, left: str = "") -> None:
+        how = f"cannot go on writing {path}: {reason}; {left}"
+        super().__init__(how if left else f"cannot write {path}: {reason}")
+        self.reason = reason
+
+
 class LogError(RecordingError):
     """The events of a recording contradict each other, so that there is nothing to tell of it."""
 

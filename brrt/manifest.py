@@ -63,9 +63,18 @@ class Branch:
         return cls(**known)
 
 
+def _json(text: str) -> Any:
+    """Read JSON as it is defined, which knows no NaN and no infinity: no setting is either."""
+    return json.loads(text, parse_constant=_refused)
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"{constant} is no number")
+
+
 def _scenario(text: str) -> Scenario:
     """Read a scenario that names what was run: what is missing would be taken for the usual."""
-    values = json.loads(text)
+    values = _json(text)
     scenario = Scenario.parse(values)
     for name in ("world", "planner"):
         if name not in values:
@@ -185,14 +194,14 @@ class Manifest:
         try:
             return cls(
                 _scenario(texts["scenario"]),
-                tuple(map(float, json.loads(texts["start"]))),
-                tuple(map(float, json.loads(texts["goal"]))),
+                tuple(map(float, _json(texts["start"]))),
+                tuple(map(float, _json(texts["goal"]))),
                 int(texts["dim"]),
                 int(texts["dof"]),
                 int(texts["epoch_ns"]),
-                dict(json.loads(texts["made_by"])),
+                dict(_json(texts["made_by"])),
                 texts.get("robot"),
-                tuple(map(Branch.parse, json.loads(texts.get("branches", "[]")))),
+                tuple(map(Branch.parse, _json(texts.get("branches", "[]")))),
             )
         except KeyError as error:
             raise BrrtError(f"the manifest is damaged: it has no {error}") from None

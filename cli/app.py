@@ -48,7 +48,8 @@ Run a planner, record every sample, rejection, edge and path with its time, look
 
 [bold]brrt planners[/bold] lists what there is to set
 
-Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 interrupted.""",
+Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 Ctrl-C,
+143 SIGTERM, 129 a closed terminal: the files are whole all the same.""",
 )
 
 app.command()(plan)

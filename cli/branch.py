@@ -43,12 +43,12 @@ def go_on(
     """
     from brrt.again import BranchedRun  # noqa: PLC0415
     from brrt.errors import RecordingError  # noqa: PLC0415
-    from brrt.recording import CutError, read  # noqa: PLC0415
+    from brrt.recording import BrokenError, read  # noqa: PLC0415
 
     seed = given.pop("seed", None)
     try:
         run = BranchedRun(read(parent), params=params, seed=seed, settings=given, **limits)
-    except CutError as error:
+    except BrokenError as error:
         raise RecordingError(
             f"{error.fault}; branch before that (--at-iteration), or save what is whole first: "
             f"brrt recover {parent} --out whole.mcap"

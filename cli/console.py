@@ -4,7 +4,7 @@ import json
 import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import IntEnum
 from typing import Any
 
@@ -25,6 +25,10 @@ class Code(IntEnum):
     FAILED = 1
     BAD_INPUT = 2
     INTERRUPTED = 130
+
+
+SIGNALLED = 128
+"""With the number of the signal that ended a command, its exit code, as shells have it."""
 
 
 def complain(message: str) -> None:
@@ -198,7 +202,8 @@ class Watch:
         finally:
             self._timer.cancel()
             if err.is_terminal and self._progress.live.is_started:
-                self._progress.stop()
+                with suppress(OSError):  # the terminal may have been closed
+                    self._progress.stop()
 
     def update(self, done: float, what: str, figures: str) -> None:
         """Say how far the job is."""

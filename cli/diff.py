@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import Code, print_json, print_lines
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.recording import Recording
@@ -17,7 +17,7 @@ def diff(
     b: Annotated[Path, typer.Argument(help="Another.", metavar="B")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Compare two runs: settings, versions, outcome, figures, and the first event that differs.
@@ -31,10 +31,9 @@ def diff(
 
     brrt diff run.mcap run.rrd --json
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
     from brrt.recording.versus import compare  # noqa: PLC0415
 
-    runs = (_saved(read(run), partial=partial) for run in (a, b))
+    runs = (_saved(opened(run, partial=partial), partial=partial) for run in (a, b))
     found = compare(*runs, names=(str(a), str(b)))
     if as_json:
         print_json(found.as_dict())

@@ -7,7 +7,7 @@ import typer
 
 from .console import note, out, print_json, print_lines
 from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
-from .saved import Saved
+from .saved import Saved, opened
 
 
 def explain(
@@ -16,7 +16,7 @@ def explain(
     at_event: AtEvent = None,
     at_iteration: AtIteration = None,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object with every figure.")
@@ -34,12 +34,11 @@ def explain(
 
     brrt explain run.mcap --json
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
     from brrt.replay.explain import explain as explained  # noqa: PLC0415
     from brrt.replay.moment import Moment  # noqa: PLC0415
 
     limits = instant(at, at_event, at_iteration)
-    recording = read(run)
+    recording = opened(run, partial=partial)
     batches = Counted(Saved(recording, partial=partial, verb="explain them"))
     moment = Moment(recording.manifest, recording.world, lambda: iter(batches), limits)
     found = explained(moment, str(run))

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .console import Watch, out
-from .saved import Saved
+from .saved import Saved, opened
 
 
 def export(
@@ -24,7 +24,7 @@ def export(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Write a run in a form that other viewers show.
@@ -33,7 +33,6 @@ def export(
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.events import Events  # noqa: PLC0415
-    from brrt.recording import read  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
@@ -43,7 +42,7 @@ def export(
     check_output(layout, "--layout", ".json", force=force)
     if foxglove.exists() and run.exists() and foxglove.samefile(run):
         raise BrrtError(f"--foxglove {foxglove}: is the recording; choose another name")
-    recording = read(run)
+    recording = opened(run, partial=partial)
     with Watch(None, "reading the recording").running() as watch:
         batches = Saved(recording, partial=partial, verb="export them")
         events = Events.concat(recording.manifest.dof, batches)

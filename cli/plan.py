@@ -1,6 +1,8 @@
 """`brrt plan`: run a planner and record it."""
 
 import shlex
+import signal
+import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -8,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from .console import Code, Watch, note, out, print_json, print_summary, tell_of_compiling
+from .console import SIGNALLED, Code, Watch, note, out, print_json, print_summary, tell_of_compiling
 from .instants import At, AtEvent, AtIteration, instant
 from .numbers import whole_number
 
@@ -216,9 +218,14 @@ def plan(
         watch.total = None if run.stop.time_s is not None else run.stop.iterations
         with stop_on_signals(run.stop):
             metrics = run.execute(_sinks(run, mcap, rrd, view=view), lambda m: _show(m, watch))
-    _report(metrics, mcap, rrd, as_json=as_json)
+    try:
+        _report(metrics, mcap, rrd, as_json=as_json)
+    except OSError:
+        if run.stop.signal != signal.SIGHUP:
+            raise
+        sys.stdout = None  # nobody is left to read it: the terminal was closed
     if run.stop.interrupted:
-        raise typer.Exit(Code.INTERRUPTED)
+        raise typer.Exit(SIGNALLED + run.stop.signal)
     if not metrics.solved:
         raise typer.Exit(Code.FAILED)
 

@@ -8,7 +8,7 @@ import typer
 
 from .console import Watch, note, out
 from .instants import At, AtEvent, AtIteration, beyond, instant
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.pictures.history import Record
@@ -93,7 +93,7 @@ def plot(
     ] = 20.0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Draw a run for a paper: its trees, the cost of its best path, where the time goes.
@@ -165,13 +165,13 @@ def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "lis
     """Read the runs, up to the instant asked for; those of one name are told apart by folder."""
     from brrt.events import Events  # noqa: PLC0415
     from brrt.pictures.history import Record  # noqa: PLC0415
-    from brrt.recording import Memory, read  # noqa: PLC0415
+    from brrt.recording import Memory  # noqa: PLC0415
     from brrt.replay.moment import feed  # noqa: PLC0415
 
     names = Counter(run.stem for run in runs)
     records = []
     for run in runs:
-        recording, memory = read(run), Memory()
+        recording, memory = opened(run, partial=partial), Memory()
         end = feed(Saved(recording, partial=partial, verb=_VERB), [memory], limits)
         if end is not None:
             late = beyond(limits, *end)

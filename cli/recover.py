@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .console import counted, out
+from .console import Code, counted, out
 
 
 def recover(
@@ -22,6 +22,9 @@ def recover(
 ) -> None:
     """Make a whole file of a recording that was cut or damaged: by a kill, a full disk, a fault.
 
+    Exit code 1: no event is whole, and the file holds the problem alone: world, start, goal and
+    settings.
+
     brrt recover cut.mcap --out whole.mcap
 
     brrt recover cut.rrd --out whole.rrd
@@ -37,10 +40,12 @@ def recover(
     events = f"{counted(found.events, 'event')} up to {found.until_s:.6f} s"
     if found.lost is None:
         text = f"{cut} is whole: {whole} holds its {events}"
-    elif found.ended:
-        text = f"{found.lost}; {whole} holds all of the run: {events}"
+    elif found.complete:
+        text = f"{found.lost}; no event is lost: {whole} holds all {events}"
     elif found.events:
-        text = f"{found.lost}; {whole} holds what is whole: {events}; what came later is lost"
+        text = f"{found.lost}; {whole} holds what is whole: {events}; anything later is lost"
     else:
-        text = f"{found.lost}; {whole} holds the problem alone: no event is whole"
+        text = f"{found.lost}; no event is whole: {whole} holds the problem alone"
     out.print(text, markup=False, soft_wrap=True)
+    if not (found.events or found.complete):
+        raise typer.Exit(Code.FAILED)

@@ -9,7 +9,7 @@ import typer
 from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
 from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
 from .node import show_node, tree_number
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.events import Instant
@@ -49,7 +49,7 @@ def replay(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording of it.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
     text: Annotated[
         bool,
@@ -79,7 +79,6 @@ def replay(
 
     brrt replay run.mcap --node 80 --at-iteration 400
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
     from brrt.replay.account import Account  # noqa: PLC0415
     from brrt.replay.diff import Newest  # noqa: PLC0415
     from brrt.replay.growth import Growth  # noqa: PLC0415
@@ -97,7 +96,7 @@ def replay(
     )
     limits = instant(at, at_event, at_iteration)
     number = tree_number(tree)
-    recording = read(run)
+    recording = opened(run, partial=partial)
     if node is not None:
         _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
         return
@@ -111,7 +110,7 @@ def replay(
         _note_end(limits, *end)
     if rrd is not None:
         _draw(recording, rrd, limits, partial=partial)
-    golden = None if check is None else read(check)
+    golden = None if check is None else opened(check, partial=False)
     first = None if golden is None else _difference(recording, golden, partial=partial)
     figures = metrics.as_dict()
     if as_json:

@@ -1,7 +1,10 @@
-"""The events of a recording, of one that was cut as far as they are whole."""
+"""The events of a recording; of one that was cut or damaged, as far as they are whole."""
 
+import shlex
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .console import counted, note
@@ -28,12 +31,23 @@ def naming_runs(command: Callable[..., None]) -> Callable[..., None]:
     return named
 
 
+def opened(run: Path, *, partial: bool) -> "Recording":
+    """Open a recording; one that is not whole, and taken in part, lacks its run's end."""
+    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+
+    recording = read(run)
+    if not partial:
+        return recording
+    known = read(run, partial=True)
+    return replace(recording, result=known.result, counts=known.counts)
+
+
 class Saved:
-    """Yields a recording's batches; where the file is cut, says what was saved.
+    """Yields a recording's batches; where the file is cut or damaged, says what was saved.
 
     Args:
         recording: The recording.
-        partial: Whether the user takes what is whole of a file that was cut.
+        partial: Whether the user takes what is whole of such a file.
         verb: What the command does with it.
     """
 
@@ -43,7 +57,7 @@ class Saved:
 
     def __iter__(self) -> "Iterator[Events]":
         from brrt.errors import RecordingError  # noqa: PLC0415 - keep --help fast
-        from brrt.recording import CutError  # noqa: PLC0415
+        from brrt.recording import BrokenError  # noqa: PLC0415
 
         self.events, last = 0, 0
         try:
@@ -51,14 +65,24 @@ class Saved:
                 self.events += len(batch)
                 last = max((int(t["t"][-1]) for t in batch.tables.values()), default=last)
                 yield batch
-        except CutError as error:
-            verb = "is" if self.events == 1 else "are"
-            saved = f"{counted(self.events, 'event')} up to {last / 1e9:.6f} s {verb} whole"
+        except BrokenError as error:
+            found = f"{error.fault}; {told_of(self.events, last / 1e9, complete=error.complete)}"
             if not self._partial:
+                remedy = f"brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
+                what, them = (self._verb, "them") if self.events else ("take the problem", "it")
                 raise RecordingError(
-                    f"{error.fault}; {saved}: {self._verb} with --partial, or save them with brrt "
-                    "recover"
+                    f"{found}: {what} with --partial, or save {them} with {remedy}"
                 ) from None
             if not self.cut:  # it may be read more than once
-                note(f"{error.fault}; {saved}")
+                note(found)
             self.cut = True
+
+
+def told_of(events: int, until_s: float, *, complete: bool) -> str:
+    """Say how many events are whole of a file that is not."""
+    if not events:
+        return "no event is whole"
+    until = f"{counted(events, 'event')} up to {until_s:.6f} s"
+    if complete:
+        return f"no event is lost, all {until} are whole"
+    return f"{until} {'is' if events == 1 else 'are'} whole"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import Code, Watch, note, out, print_json, print_lines, tell_of_compiling
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.recording import Recording
@@ -28,7 +28,7 @@ def verify(
         bool,
         typer.Option(
             "--partial",
-            help="Judge what is whole of a file that was cut; what is promised of a run's end "
+            help="Judge what is whole of a cut or damaged file; what is promised of a run's end "
             "is left out.",
         ),
     ] = False,
@@ -65,12 +65,11 @@ def verify(
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.planners import PLANNERS  # noqa: PLC0415
-    from brrt.recording import read  # noqa: PLC0415
     from brrt.replay.checks import examine  # noqa: PLC0415
 
     if tolerance is not None and (not rerun or not tolerance >= 0):
         raise BrrtError("--tolerance must be a number from 0 on, and goes with --rerun alone")
-    recording = read(run)
+    recording = opened(run, partial=partial)
     planner = recording.manifest.scenario.planner
     saved = Saved(recording, partial=partial, verb="verify them")
     # A file that brrt recover made breaks off too, though it is whole.

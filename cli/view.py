@@ -1,18 +1,16 @@
 """`brrt view`: a recording, or two, in the Rerun viewer: a window, the browser, or a picture."""
 
 import re
-import signal
+import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import Watch, out
+from .console import SIGNALLED, Watch, out
 from .instants import At, AtEvent, AtIteration, beyond, instant
-from .saved import Saved
+from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.events import Events
@@ -64,7 +62,7 @@ def view(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the picture.")] = False,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a file that was cut.")
+        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
     """Look at a recording, or at two side by side with a ring where they part.
@@ -83,7 +81,10 @@ def view(
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
-    with tempfile.TemporaryDirectory(prefix="brrt-") as folder, _ending_in_order():
+    from brrt.planners.stop import handling_signals  # noqa: PLC0415 - keep --help fast
+
+    # Ended by a signal as by Ctrl-C, nothing that we started or wrote for a while outlives us.
+    with tempfile.TemporaryDirectory(prefix="brrt-") as folder, handling_signals(_end):
         with Watch(None, "drawing").running() as watch:
             file, cursor, *marks = _prepare(runs, limits, Path(folder), watch, partial=partial)
         if web:
@@ -149,9 +150,7 @@ def _prepare(
 
     Behind them come files with more to show.
     """
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
-
-    recordings = [read(run) for run in runs]
+    recordings = [opened(run, partial=partial) for run in runs]
     logs, cut = [], False
     for recording, run in zip(recordings, runs, strict=True):
         watch.update(0, f"reading {run.name}", "")
@@ -263,19 +262,5 @@ def _serve(file: Path, runs: list[Path], port: int | None) -> None:
         server.close()
 
 
-@contextmanager
-def _ending_in_order() -> Iterator[None]:
-    """End by a signal as by Ctrl-C: nothing that we started or wrote for a while outlives us."""
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
-        numbers.append(signal.SIGHUP)
-    before = [signal.signal(number, _interrupt) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
+def _end(number: int, _: object) -> None:
+    sys.exit(SIGNALLED + number)

@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from brrt import Events, Kind, McapSink, RecordingError, Scenario, compare, first_difference, read
 from brrt.recording.container import MAGIC
 from brrt.recording.mcap_records import SEAL
+from brrt.recording.recover import recover
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import FRAME
 from brrt.recording.rrd_outline import Outline
@@ -86,6 +87,7 @@ class Forger:
         schema: Callable[[str], str] = str,
         attach: str = "world.json",
         twice: bool = False,
+        events: int | None = None,
         late: bool = False,
     ) -> Path:
         """Write it.
@@ -94,6 +96,7 @@ class Forger:
             schema: Changes the text of a schema.
             attach: Name of the world's attachment.
             twice: Divide the messages of each topic between two channels.
+            events: So many the figures speak of, if there are to be figures.
             late: Write the manifest behind the messages.
         """
         with self.path.open("wb") as file:
@@ -115,6 +118,8 @@ class Forger:
                     ids[channel.id, half], message.log_time, message.data,
                     message.publish_time, message.sequence,
                 )  # fmt: skip
+            if events is not None:
+                out.add_metadata("brrt.result", {"events": str(events)})
             if late:
                 out.add_metadata("brrt.run", self.run)
             out.finish()
@@ -174,16 +179,27 @@ def test_two_channels_of_a_topic(forger: Forger) -> None:
 
 
 def test_events_missing_and_twice(forger: Forger) -> None:
-    """Every number is there once."""
+    """Every number is there once; what is ahead of the first of which that is not so is saved."""
     log = forger.messages
-    for messages, message in (
-        (log[:7] + log[8:], "events are missing"),
-        (log[1:], "events are missing"),
-        ([*log[:7], log[6], *log[8:]], "out of order"),
-        (log[:-1] + [log[-1]] * 2, "out of order"),
+    for messages, message, count in (
+        (log[:7] + log[8:], "events are missing", 7),
+        (log[1:], "events are missing", 0),
+        ([*log[:7], log[6], *log[8:]], "out of order", 7),
+        (log[:-1] + [log[-1]] * 2, "out of order", len(log)),
     ):
         forger.messages = messages
         assert message in told(forger.forge())
+        found = recover(forger.path, forger.path.with_name("whole.mcap"))
+        assert (found.events, found.complete) == (count, False)
+
+
+def test_last_events_missing(forger: Forger) -> None:
+    """What the figures speak of must be there."""
+    n = len(forger.messages)
+    forger.forge(events=n)
+    assert len(read(forger.path).events()) == n
+    forger.messages = forger.messages[:-3]
+    assert f"damaged: {n} events were written, {n - 3} are there" in told(forger.forge(events=n))
 
 
 MANIFESTS: dict[str, tuple[dict[str, str], str]] = {
@@ -197,6 +213,12 @@ MANIFESTS: dict[str, tuple[dict[str, str], str]] = {
     "long number": ({"dof": "9" * 5000}, "the manifest is damaged"),
     "recursion": ({"scenario": "[" * 200_000}, "the manifest is damaged"),
     "foreign": ({"scenario": "[]"}, "a scenario must be a table"),
+    "not a number": ({"start": "[NaN, 1]"}, "NaN is no number"),
+    "infinite": ({"goal": "[1e999, 1]"}, "damaged: goal is (inf, 1.0)"),
+    "parameter": (
+        {"scenario": '{"world": "w", "planner": "mine", "params": {"a": Infinity}}'},
+        "Infinity is no number",
+    ),
 }
 
 

@@ -2,20 +2,26 @@
 
 import errno
 import resource
+import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import rerun as rr
+from hypothesis import given
+from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from brrt import Events, McapSink, RecordingError, Run, Scenario, first_difference, read
+from brrt import Events, Kind, McapSink, RecordingError, Run, Scenario, first_difference, read
+from brrt.events import table_dtype
 from brrt.planners.stop import Stop
-from brrt.recording import CutError, Memory, mcap_writer, rerun
+from brrt.recording import CutError, DamagedError, Memory, mcap_writer, rerun
 from brrt.recording.background import Background
 from brrt.recording.drain import Drain
 from brrt.recording.output import Output
@@ -23,6 +29,7 @@ from brrt.recording.recover import NOTE, recover
 from brrt.recording.rerun import RerunSink
 from brrt.recording.rrd_frames import BATCH, FRAME, HEAD, unpacked
 from brrt.recording.rrd_outline import Outline
+from brrt.recording.sound import Numbering
 from brrt.recording.stamp import BLANK, WRITTEN
 
 from .conftest import Result, recorded
@@ -288,6 +295,153 @@ def test_recover_what_stands_ahead_of_damage(ending: str, tmp_path: Path) -> Non
     assert begins(log, events)
 
 
+def records(data: bytes, opcode: int) -> list[tuple[int, int]]:
+    """Place and length, head included, of an MCAP file's records of a kind."""
+    found, at = [], 8
+    while at + 9 <= len(data) - 8:
+        op, length = struct.unpack_from("<BQ", data, at)
+        found += [(at, length + 9)] if op == opcode else []
+        at += length + 9
+    return found
+
+
+def test_damage_beside_the_events_takes_none(tmp_path: Path) -> None:
+    """In an index, the figures, the summary or their heads: all events are saved, and figures."""
+    path, whole = tmp_path / "run.mcap", tmp_path / "whole.mcap"
+    log = write(path)
+    data, figures = path.read_bytes(), read(path).result
+    (index, size), (result, _) = records(data, 7)[5], records(data, 12)[-1]
+    end = records(data, 15)[0][0]
+    places = [*range(index, index + min(size, 31)), *range(result, result + 9), result + 60]
+    for place in [*places, *range(end, end + 13), *range(end + 13, len(data) - 8, 397)]:
+        damaged = bytearray(data)
+        damaged[place] ^= 1 << place % 8
+        path.write_bytes(damaged)
+        events, error = saved(path)
+        assert isinstance(error, DamagedError), place
+        assert len(events) == len(log), (place, error)
+        found = recover(path, whole)
+        assert (found.events, found.complete, found.ended) == (len(log), True, True), (place, error)
+        assert begins(log, events)
+        assert first_difference([events], read(whole).batches()) is None
+        assert read(whole).result == figures
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_recover_up_to_a_gap_or_an_impossible_value(ending: str, tmp_path: Path) -> None:
+    """Of a batch that lacks an event, or has one that none can be, the events ahead are saved."""
+    run, log = recorded(SCENARIO, batch=100)
+    path, whole = tmp_path / f"run{ending}", tmp_path / f"whole{ending}"
+    samples = log[Kind.SAMPLE].copy()
+    at = len(samples) // 2
+    samples["q"][at] = np.nan
+    odd = Events(log.dof, {**log.tables, Kind.SAMPLE: samples})
+    for k, events in [
+        *((k, log) for k in (0, 1, 57, len(log) - 2)),
+        (int(samples["seq"][at]), odd),
+    ]:
+        sink = new_sink(path, run)
+        if events is log:
+            sink.write(part(log, 0, k))
+            sink.write(part(log, k + 1, len(log)))
+        else:
+            sink.write(odd)
+        sink.close(whole=True)
+        found = recover(path, whole)
+        assert (found.events, found.complete) == (k, False)
+        assert "damaged" in (found.lost or "")
+        kept, _ = saved(whole)
+        assert len(kept) == k
+        assert begins(log, kept)
+
+
+@given(st.lists(st.integers(0, 11), max_size=12), st.lists(st.integers(0, 11), max_size=12))
+def test_beginning_of_a_batch(a: list[int], b: list[int]) -> None:
+    """`Numbering.beginning` gives the longest row of numbers in which each is there once."""
+    tables = {}
+    for kind, seqs in ((Kind.SAMPLE, a), (Kind.REJECT, b)):
+        tables[kind] = np.zeros(len(seqs), table_dtype(kind, 2))
+        tables[kind]["seq"] = seqs
+    first, count = 3, 0
+    rising = [naive_rising(seqs) for seqs in (a, b)]
+    while sum(first + count in seqs for seqs in rising) == 1:
+        count += 1
+    numbering = Numbering(first)
+    events, wrong = numbering.beginning(Events(2, tables))
+    found = sorted(int(seq) for table in events.tables.values() for seq in table["seq"])
+    assert found == list(range(first, first + count))
+    assert numbering.next == first + count
+    assert (wrong is None) == (count == len(a) + len(b))
+
+
+def naive_rising(seqs: list[int]) -> list[int]:
+    """The numbers up to the first that is not above the one ahead of it."""
+    kept = list[int]()
+    for seq in seqs:
+        if kept and seq <= kept[-1]:
+            break
+        kept.append(seq)
+    return kept
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_damaged_file_names_remedies(ending: str, brrt: Command, tmp_path: Path) -> None:
+    """Each command names both; with --partial it takes what is ahead of the damage."""
+    path = tmp_path / f"run{ending}"
+    log = write(path)
+    data = path.read_bytes()
+    assert read(path, partial=True).result == read(path).result
+    for place, least, most in ((len(data) // 2, 1, len(log) - 1), (-40, len(log), len(log))):
+        damaged = bytearray(data)
+        damaged[place] ^= 8
+        path.write_bytes(damaged)
+        for command in ("replay", "verify", "explain"):
+            done = brrt(command, path.name)
+            assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+            assert " with --partial, or save them with brrt recover run" in done.err
+            assert ("no event is lost" in done.err) == (most == len(log))
+        taken = read(path, partial=True)
+        assert taken.result is None
+        assert least <= len(taken.events()) <= most
+        assert brrt("verify", path.name, "--partial").code == 0
+        done = brrt("replay", path.name, "--partial", "--json")
+        assert (done.code, done.err.count("\n")) == (0, 1)
+        assert least <= done.json["events"] <= most
+        done = brrt("recover", path.name, "--out", "whole.mcap", "--force")
+        assert done.code == 0
+        assert ("no event is lost" in done.out) != ("anything later is lost" in done.out)
+
+
+def test_nothing_is_given_under_a_head_that_is_not_proved(tmp_path: Path) -> None:
+    """Of an .rrd that was killed, no event comes with a manifest whose checksum is wrong."""
+    path = tmp_path / "run.rrd"
+    write(path)
+    data = path.read_bytes()[: path.stat().st_size // 2]
+    first = first_event(path)
+    for place in range(20, first, first // 40):
+        damaged = bytearray(data)
+        damaged[place] ^= 2
+        path.write_bytes(damaged)
+        with pytest.raises(RecordingError, match=r"run\.rrd: "):
+            read(path)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_replaced_while_it_is_read(ending: str, tmp_path: Path) -> None:
+    """The manifest of one run and the events of another never come together."""
+    path = tmp_path / f"run{ending}"
+    write(path)
+    run, log = recorded(replace(SCENARIO, seed=8), batch=100)
+    opened = read(path)
+    sink = new_sink(path, run)
+    run_all(sink, log)
+    with pytest.raises(RecordingError, match="was replaced while it was being read"):
+        list(opened.batches())
+    path.unlink()
+    with pytest.raises(RecordingError, match=r"No such file"):
+        list(opened.batches())
+
+
 def test_recover_says_what_it_did(brrt: Command, tmp_path: Path) -> None:
     """In one line; nothing is written over the recording, nor where there is nothing to save."""
     log = write(tmp_path / "run.mcap")
@@ -297,7 +451,7 @@ def test_recover_says_what_it_did(brrt: Command, tmp_path: Path) -> None:
     done = brrt("recover", "run.mcap", "--out", "a.mcap")
     assert done.out.startswith(f"run.mcap is whole: a.mcap holds its {len(log):,} events up to 0.")
     done = brrt("recover", "nearly.mcap", "--out", "b.mcap")
-    assert f"; b.mcap holds all of the run: {len(log):,} events up to" in done.out
+    assert f"; no event is lost: b.mcap holds all {len(log):,} events up to" in done.out
     done = brrt("recover", "cut.mcap", "--out", "c.mcap")
     assert "; c.mcap holds what is whole: " in done.out
     assert done.out.count("\n") == 1
@@ -317,12 +471,13 @@ def test_what_a_cut_leaves_is_never_called_broken(
 ) -> None:
     """Ahead of the first event, behind a batch and behind the last one: recovered, it verifies."""
     path = tmp_path / f"run{ending}"
-    log, found = write(path), set()
+    log, found = write(path), set[int]()
     data, first = path.read_bytes(), first_event(path)
     cut, whole = tmp_path / f"cut{ending}", tmp_path / f"whole{ending}"
     for size in (first + 30, (first + len(data)) // 2, len(data) - 9):
         cut.write_bytes(data[:size])
-        assert brrt("recover", cut.name, "--out", whole.name, "--force").code == 0
+        done = brrt("recover", cut.name, "--out", whole.name, "--force")
+        assert (done.code, "the problem alone" in done.out) == (int(not found), not found)
         for name, options in ((whole.name, []), (cut.name, ["--partial"])):
             done = brrt("verify", name, "--json", *options)
             assert (done.code, done.json["holds"]) == (0, True), done.out
@@ -367,7 +522,7 @@ def test_events_of_an_rrd_are_sound_ahead_of_their_picture(tmp_path: Path) -> No
     """A checksum stands right behind a batch's events: what is drawn of them may be cut off."""
     path = tmp_path / "run.rrd"
     log = write(path, batch=10**6)
-    data, (_, at, length) = path.read_bytes(), Outline.of(path).places[-1]
+    data, (_, at, length, _) = path.read_bytes(), Outline.of(path).places[-1]
     check = at + length
     path.write_bytes(data[: check + FRAME.size + FRAME.unpack_from(data, check)[1]])
     assert len(saved(path)[0]) == len(log)
@@ -377,7 +532,13 @@ def test_recover_to_a_disk_that_is_full(tmp_path: Path) -> None:
     """The message names the file that was asked for, and nothing is left of it."""
     path, whole = tmp_path / "run.mcap", tmp_path / "whole.mcap"
     write(path)
-    with files_limited_to(20_000), pytest.raises(RecordingError, match=r" \S+/whole\.mcap: File"):
+    with (
+        files_limited_to(20_000),
+        pytest.raises(
+            RecordingError,
+            match=r" \S+/whole\.mcap: File too large; nothing of it is left: name .* more room$",
+        ),
+    ):
         recover(path, whole)
     assert list(tmp_path.iterdir()) == [path]
 

@@ -3,7 +3,7 @@
 import math
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
@@ -22,12 +22,14 @@ class Stop:
         draws: Draws that it may make, whether they count or not; None for no limit.
         time_s: Seconds it may take; None for no limit, and then no event depends on the clock.
         interrupted: Set it to stop the run at the next batch.
+        signal: Number of the signal that set it; 0 if none did.
     """
 
     iterations: int = 1_000_000
     draws: int | None = None
     time_s: float | None = None
     interrupted: bool = False
+    signal: int = 0
     _share: int = field(default=256, init=False, repr=False, compare=False)
     _asked: float = field(default=math.inf, init=False, repr=False, compare=False)
 
@@ -58,18 +60,29 @@ class Stop:
 
 @contextmanager
 def stop_on_signals(stop: Stop) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the run properly instead of killing it; a second one kills."""
+    """Let a signal end the run properly instead of killing it; a second one kills."""
 
-    def raise_flag(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    def raise_flag(number: int, _: FrameType | None) -> None:
         if stop.interrupted:
             raise KeyboardInterrupt
-        stop.interrupted = True
+        stop.interrupted, stop.signal = True, number
 
-    before = {
-        number: signal.signal(number, raise_flag) for number in (signal.SIGINT, signal.SIGTERM)
-    }
+    with handling_signals(raise_flag):
+        yield
+
+
+@contextmanager
+def handling_signals(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Let a handler take what asks a program to end: Ctrl-C, SIGTERM, and a terminal's closing.
+
+    The last of them is left alone where it is ignored, as under nohup.
+    """
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, old in before.items():
+            signal.signal(number, old)

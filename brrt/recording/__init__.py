@@ -10,11 +10,11 @@ from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events
 from brrt.files import is_there
 from brrt.recording.container import MAGIC
-from brrt.recording.mcap_reader import read_mcap
+from brrt.recording.mcap_reader import is_whole, read_mcap
 from brrt.recording.mcap_writer import McapSink
 from brrt.recording.memory import Memory
 from brrt.recording.recording import Recording
-from brrt.recording.sound import CutError
+from brrt.recording.sound import BrokenError, CutError, DamagedError
 
 _RRD = b"RRF"
 
@@ -24,21 +24,30 @@ def read(path: Path | str, *, partial: bool = False) -> Recording:
 
     Args:
         path: The file.
-        partial: Take what is whole of a file that was cut; otherwise `CutError` is raised where
-            the cut is met. A recording whose `result` is None ends ahead of its run's end.
+        partial: Take what is whole of a file that was cut or damaged; otherwise `CutError` or
+            `DamagedError` is raised where that is met. A recording whose `result` is None ends
+            ahead of its run's end.
 
     Raises:
         RecordingError: The file cannot be read, or is not a recording of brrt.
     """
     recording = _opened(path)
-    if partial:
-        return replace(recording, batches=bound(_whole_part, recording.batches))
-    return recording
+    if not partial:
+        return recording
+    if recording.result is not None and not _is_whole(Path(path)):
+        recording = replace(recording, result=None, counts=None)
+    return replace(recording, batches=bound(_whole_part, recording.batches))
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether no event is lost of a file that has an end; an .rrd has none if that is not so."""
+    with path.open("rb") as file:
+        return file.read(len(_RRD)) == _RRD or is_whole(path)
 
 
 def _whole_part(batches: Callable[[], Iterator[Events]]) -> Iterator[Events]:
-    """Yield the events that stand ahead of a cut."""
-    with suppress(CutError):
+    """Yield the events that stand ahead of a cut or of damage."""
+    with suppress(BrokenError):
         yield from batches()
 
 
@@ -48,7 +57,9 @@ def _opened(given: Path | str) -> Recording:
     except TypeError:
         raise BrrtError(f"read takes the name of a file, not {type(given).__name__}") from None
     try:
-        if not (path.is_file() or path.is_dir()) and is_there(path):
+        if path.is_dir():
+            raise RecordingError(f"{path}: is a folder; name a recording in it, .mcap or .rrd")
+        if not path.is_file() and is_there(path):
             raise RecordingError(f"{path}: no file but a pipe or a device; save it to a file first")
         with path.open("rb") as file:
             begin = file.read(len(MAGIC))
@@ -63,4 +74,13 @@ def _opened(given: Path | str) -> Recording:
     raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
 
 
-__all__ = ["CutError", "McapSink", "Memory", "Recording", "read", "read_mcap"]
+__all__ = [
+    "BrokenError",
+    "CutError",
+    "DamagedError",
+    "McapSink",
+    "Memory",
+    "Recording",
+    "read",
+    "read_mcap",
+]

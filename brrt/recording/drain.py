@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from brrt.errors import RecordingError
+from brrt.errors import WriteError
 from brrt.recording.output import Output
 
 _BLOCK = 1 << 20
@@ -109,9 +109,9 @@ class Drain:
         except Exception as error:  # noqa: BLE001 - told on the caller's thread
             self._error = self._error or error
 
-    def _cannot_write(self, error: Exception) -> RecordingError:
+    def _cannot_write(self, error: Exception) -> WriteError:
         reason = getattr(error, "strerror", None) or str(error) or repr(error)
-        return RecordingError(f"cannot write {self._path}: {reason}")
+        return WriteError(self._path, reason)
 
 
 def _readable(pipe: int) -> select.poll:

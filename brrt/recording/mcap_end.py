@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from io import BytesIO
 from os import SEEK_END
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from mcap import records
 from mcap.opcode import Opcode
@@ -24,15 +24,30 @@ Result = Mapping[str, Any]
 Counts = Mapping[Kind, int]
 
 
-def ending(path: Path) -> tuple[Result | None, Counts | None]:
-    """Look up the figures and the events of each kind; None for what is not there.
+class Ending(NamedTuple):
+    """What the end of a file says of the run.
+
+    Attributes:
+        result: The figures; None if they are not there, or damaged.
+        counts: Events of each kind; None if they are not there.
+        ended: Whether there are figures, so that the run came to its own end.
+    """
+
+    result: Result | None = None
+    counts: Counts | None = None
+    ended: bool = False
+
+
+def ending(path: Path) -> Ending:
+    """Look up the figures and the events of each kind.
 
     A file that was cut has no end, and one whose end is damaged none to rely on; their events are
     still good, as far as they are there.
     """
-    result, counts, kinds = None, None, dict[int, Kind]()
-    with path.open("rb") as file:
-        try:
+    counts: Counts | None = None
+    kinds, place = dict[int, Kind](), None
+    try:
+        with path.open("rb") as file:
             for opcode, data in _summary(path, file):
                 if opcode == Opcode.CHANNEL:
                     channel = parsed(path, records.Channel, data)
@@ -43,12 +58,35 @@ def ending(path: Path) -> tuple[Result | None, Counts | None]:
                     counts = {kind: int(stated.get(id_, 0)) for id_, kind in kinds.items()}
                 elif opcode == Opcode.METADATA_INDEX:
                     index = parsed(path, records.MetadataIndex, data)
-                    if index.name == RESULT and index.length <= MOST_BYTES:
-                        file.seek(index.offset)
-                        result = figures_of(path, metadata_of(path, file.read(index.length)[9:]))
-        except (OSError, OverflowError, RecordingError):
-            return None, None
-    return result, counts
+                    place = index if index.name == RESULT else place
+            return Ending(_result(path, file, place), counts, ended=place is not None)
+    except (OSError, OverflowError, RecordingError):
+        return Ending()
+
+
+def _result(path: Path, file: IO[bytes], place: records.MetadataIndex | None) -> Result | None:
+    """Read the figures where they are; None if there are none, or damaged."""
+    if place is None or place.length > MOST_BYTES:
+        return None
+    file.seek(place.offset)
+    try:
+        return figures_of(path, metadata_of(path, file.read(place.length)[9:]))
+    except RecordingError:
+        return None
+
+
+def chunk_starts(path: Path) -> list[int]:
+    """Return where the chunks of a file begin, in order; none where its summary is not whole."""
+    starts = set[int]()
+    try:
+        with path.open("rb") as file:
+            for opcode, data in _summary(path, file):
+                if opcode == Opcode.CHUNK_INDEX:
+                    starts.add(parsed(path, records.ChunkIndex, data).chunk_start_offset)
+            size = file.seek(0, SEEK_END)
+    except (OSError, OverflowError, RecordingError):
+        return []
+    return sorted(start for start in starts if start < size)
 
 
 def _summary(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
@@ -60,7 +98,7 @@ def _summary(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
         check_summary(path, file)
         file.seek(start)
         rest = BytesIO(file.read(size - start + FOOTER))
-        for opcode, data in records_of(path, rest, check_end=False):
+        for opcode, data in records_of(path, rest):
             if opcode == Opcode.FOOTER:
                 return
             yield opcode, data

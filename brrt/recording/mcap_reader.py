@@ -1,46 +1,42 @@
 """Events out of MCAP: record by record from the front, so that a cut file gives what it has."""
 
-import struct
-import zlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import zstandard
-from mcap import records
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Kind, table_dtype
+from brrt.errors import RecordingError
+from brrt.events import Events
 from brrt.manifest import Manifest
-from brrt.recording.cdr import MESSAGE, RECORD_HEAD, Layout
-from brrt.recording.mcap_end import LABELS, ending, figures_of
-from brrt.recording.mcap_records import attachment_of, metadata_of, opened, parsed, records_of
+from brrt.recording.mcap_decoder import Decoder
+from brrt.recording.mcap_end import chunk_starts, ending, figures_of
+from brrt.recording.mcap_records import (
+    attachment_of,
+    check_summary,
+    ends_as_mcap,
+    metadata_of,
+    opened,
+    records_of,
+)
 from brrt.recording.mcap_writer import RESULT, RUN, WORLD
 from brrt.recording.recording import Recording
-from brrt.recording.sound import MOST_BYTES, CutError, Numbering, head, nothing_whole
+from brrt.recording.sound import CutError, DamagedError, ReplacedError, head
 
-_ANY, _TIMES = 1 << 20, 256
-"""Of what a chunk unpacks to: bytes in any case, and times its size; events come to 15 times."""
+_MOST_LEAPS = 50
+"""Over damaged records: each may cost to read as much as a record may hold."""
 
-_DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
-_MOST_DECLARED, _MOST_SCHEMA = 100_000, 1 << 20
-"""Schemas and channels in a file, which other tools repeat in each chunk; bytes of a schema."""
-
-_MOST_SEARCHED = 4_000_000
-"""Messages that are searched for in chunks without an index: a second or two."""
-
-_INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
+Index = dict[int, NDArray[np.uint64]]
 
 
 def read_mcap(path: Path) -> Recording:
     """Open a recording.
 
-    Its batches raise `CutError` behind the last whole chunk of a file that was cut.
+    Its batches raise `CutError` behind the last whole chunk of a file that was cut, and
+    `DamagedError` behind the last event that is proved whole of one that is damaged.
 
     Raises:
         RecordingError: The file cannot be read, or is not a recording of brrt.
@@ -55,9 +51,9 @@ def read_mcap(path: Path) -> Recording:
                 attachment = attachment_of(path, data)
                 if attachment.name == WORLD:
                     manifest, world = head(path, texts, attachment.data)
-                    batches = partial(_batches, path, manifest)
-                    result, counts = ending(path)
-                    return Recording(manifest, world, batches, result, counts)
+                    batches = partial(_batches, path, manifest, texts)
+                    end = ending(path)
+                    return Recording(manifest, world, batches, end.result, end.counts)
             elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
                 break
     raise RecordingError(
@@ -67,220 +63,151 @@ def read_mcap(path: Path) -> Recording:
     )
 
 
+def is_whole(path: Path) -> bool:
+    """Whether the checksums of data and summary are right; the events are not looked at."""
+    try:
+        with opened(path) as file:
+            for _ in records_of(path, file):
+                pass
+            check_summary(path, file)
+    except RecordingError:
+        return False
+    return True
+
+
 def _head_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     try:
-        yield from records_of(path, file, check_end=False)
+        yield from records_of(path, file)
     except CutError as error:
-        raise nothing_whole(error) from None
+        raise error.in_front() from None
 
 
-@dataclass(slots=True)
-class _Channel:
-    kind: Kind
-    layout: Layout
+def _batches(path: Path, manifest: Manifest, texts: Mapping[str, str]) -> Iterator[Events]:
+    """Yield the events of each chunk, up to the first that is not proved whole.
+
+    What is damaged besides, as an index, is told behind them.
+    """
+    walk = _Walk(Decoder(path, manifest), texts)
+    decoder = walk.decoder
+    with opened(path) as file:
+        for chunk, index in walk.chunks(file):
+            try:
+                events = decoder.events(chunk, index)
+            except RecordingError as error:
+                decoder.note(error)  # whether events are missing for that, the next ones tell
+                continue
+            if len(events):
+                yield events
+            if decoder.over:
+                break
+    walk.judge()
 
 
-@dataclass(slots=True)
-class _Decoder:
-    """Turns chunks into events; knows the channels seen so far."""
+class _Walk:
+    """Goes through a file's data, and over what is damaged in it.
 
-    path: Path
-    manifest: Manifest
-    numbering: Numbering = field(default_factory=Numbering)
-    searched: int = 0
-    declared: int = 0
-    schemas: dict[int, str] = field(default_factory=dict)
-    channels: dict[int, _Channel] = field(default_factory=dict)
+    Args:
+        decoder: Knows how far the events go, and what is wrong.
+        texts: Those of the manifest that was read.
+    """
 
-    def damaged(self, why: str) -> RecordingError:
-        last = self.numbering.next - 1
-        place = "ahead of the first event" if last < 0 else f"after event {last:,}"
-        return RecordingError(f"{self.path}: damaged {place}: {why}")
+    def __init__(self, decoder: Decoder, texts: Mapping[str, str]) -> None:
+        self.decoder, self._path, self._texts = decoder, decoder.path, texts
+        self._figures: Mapping[str, Any] | None = None
+        self._sound, self._same = False, False
 
-    def index(self, data: bytes) -> tuple[int, NDArray[np.uint64]]:
-        """Read where a channel's messages are in the chunk ahead."""
-        if len(data) < 6:
-            raise self.damaged("an index lies about its size")
-        channel, nbytes = struct.unpack_from("<HI", data)
-        if nbytes != len(data) - 6 or nbytes % _INDEX.itemsize:
-            raise self.damaged("an index lies about its size")
-        return channel, np.frombuffer(data, _INDEX, offset=6)["offset"]
+    def chunks(self, file: IO[bytes]) -> Iterator[tuple[bytes, Index]]:
+        """Yield each chunk and its indexes.
 
-    def unpack(self, data: bytes) -> bytes:
-        """Decompress a chunk's records and check them."""
-        chunk = parsed(self.path, records.Chunk, data)
-        size = chunk.uncompressed_size
-        try:
-            if chunk.compression == "":
-                raw = chunk.data
-            elif chunk.compression != "zstd":
-                raise self.damaged(f"compression {chunk.compression!r} is not brrt's")
-            elif size > min(MOST_BYTES, _ANY + _TIMES * len(chunk.data)):
-                raise self.damaged(f"a chunk says that it unpacks to {size:,} bytes")
-            elif zstandard.frame_content_size(chunk.data) != size:
-                raise self.damaged("a chunk lies about its size")
-            else:
-                raw = zstandard.ZstdDecompressor().decompress(chunk.data)
-        except zstandard.ZstdError as error:
-            raise self.damaged(str(error)) from None
-        if len(raw) != size or zlib.crc32(raw) != chunk.uncompressed_crc:
-            raise self.damaged("the checksum of a chunk does not match")
-        return bytes(raw)
-
-    def learn(self, raw: bytes) -> int:
-        """Take in the schemas and channels that a chunk begins with; return where they end."""
-        at = 0
-        while at + 9 <= len(raw) and raw[at] in _DECLARATIONS:
-            at = self._declare(raw, at)
-        return at
-
-    def _declare(self, raw: bytes, at: int) -> int:
-        """Take in a schema or a channel; return where it ends."""
-        opcode, length = struct.unpack_from("<BQ", raw, at)
-        end: int = at + 9 + length
-        self.declared += 1
-        if self.declared > _MOST_DECLARED or length > _MOST_SCHEMA:
-            raise self.damaged("it declares more than any real file")
-        data = raw[at + 9 : end]
-        if opcode == Opcode.SCHEMA:
-            schema = parsed(self.path, records.Schema, data)
-            self.schemas[schema.id] = schema.data.decode(errors="replace")
-            return end
-        channel = parsed(self.path, records.Channel, data)
-        if channel.topic not in LABELS or channel.schema_id not in self.schemas:
-            return end
-        try:
-            layout = Layout.parse(self.schemas[channel.schema_id])
-        except (BrrtError, ValueError) as error:
-            raise self.damaged(f"the schema of {channel.topic}: {error}") from None
-        self.channels[channel.id] = _Channel(LABELS[channel.topic], layout)
-        return end
-
-    def events(self, chunk: bytes, index: Mapping[int, NDArray[np.uint64]]) -> Events:
-        """Decode the messages of a chunk.
-
-        Args:
-            chunk: Content of a chunk's record.
-            index: Where the messages of each channel are, as far as its indexes say.
+        Where records cannot be told from each other any more, go on with the next chunk that the
+        summary knows of, if that is whole.
 
         Raises:
-            RecordingError: The chunk, an index or a message does not hold what it says.
+            RecordingError: It is another file by now.
         """
-        raw = self.unpack(chunk)
-        begin = self.learn(raw)
-        tables, size = self._tables(raw, index)
-        if begin + size < len(raw):
-            # A file that was cut between a chunk and its indexes, or written anew by other tools.
-            tables, _ = self._tables(raw, self._found(raw, begin))
-        events = Events(self.manifest.dof, dict(sorted(tables.items())))
+        begun = yield from self._stretch(file)
+        if self.decoder.wrong is None:
+            return
+        leaps = [start for start in chunk_starts(self._path) if start > begun]
+        for start in leaps[:_MOST_LEAPS]:
+            if start > begun:
+                file.seek(start)
+                begun = max(start, (yield from self._stretch(file)))
+
+    def _stretch(self, file: IO[bytes]) -> Generator[tuple[bytes, Index], None, int]:
+        """Yield chunks and their indexes until the end or damage; return where the last began."""
+        decoder, path = self.decoder, self._path
+        begun, behind = 0, file.tell()
+        chunk: bytes | None = None
+        index: Index = {}
         try:
-            self.numbering.take(events)
-        except BrrtError as error:
-            raise self.damaged(str(error)) from None
-        return events
-
-    def _tables(
-        self, raw: bytes, index: Mapping[int, NDArray[np.uint64]]
-    ) -> tuple[dict[Kind, NDArray[np.void]], int]:
-        """Decode the messages of our channels; return how many bytes they are, too."""
-        tables, size = dict[Kind, NDArray[np.void]](), 0
-        for number, offsets in index.items():
-            channel = self.channels.get(number)
-            if channel is not None and len(offsets):
-                if channel.kind in tables:
-                    raise self.damaged(f"two channels hold events of kind {channel.kind.label}")
-                tables[channel.kind] = self._table(raw, number, channel, offsets)
-                size += self._sizes(raw, channel, offsets)
-        return tables, size
-
-    def _sizes(self, raw: bytes, channel: _Channel, offsets: NDArray[np.uint64]) -> int:
-        """Bytes of messages, of which `_table` has seen that they are some."""
-        if channel.layout.ragged is None:
-            return len(offsets) * channel.layout.record.itemsize
-        return sum(9 + int(struct.unpack_from("<Q", raw, int(at) + 1)[0]) for at in offsets)
-
-    def _found(self, raw: bytes, at: int) -> dict[int, NDArray[np.uint64]]:
-        """Index the messages of a chunk by going from one to the next."""
-        found: dict[int, list[int]] = {}
-        while at < len(raw):
-            if raw[at] in _DECLARATIONS and at + 9 <= len(raw):
-                at = self._declare(raw, at)
-                continue
-            if at + RECORD_HEAD.itemsize > len(raw) or self.searched > _MOST_SEARCHED:
-                raise self.damaged("a chunk without its index")
-            opcode, length, channel = struct.unpack_from("<BQH", raw, at)
-            if opcode == MESSAGE:
-                found.setdefault(channel, []).append(at)
-            at += 9 + length
-            self.searched += 1
-        return {channel: np.array(places, np.uint64) for channel, places in found.items()}
-
-    def _table(
-        self, raw: bytes, number: int, channel: _Channel, offsets: NDArray[np.uint64]
-    ) -> NDArray[np.void]:
-        layout, size = channel.layout, channel.layout.record.itemsize
-        places = len(raw) - size + 1
-        if len(offsets) * size > len(raw) or int(offsets.max()) >= places:
-            raise self.damaged("an index points out of its chunk")
-        window = np.ndarray((places,), f"V{size}", raw, strides=(1,))
-        block = window[offsets].view(layout.record)
-        sound = (block["op"] == MESSAGE) & (block["channel"] == number)
-        if layout.ragged is None:
-            sound &= block["length"] == size - 9
-        if not sound.all():
-            raise self.damaged("an index does not point at a message")
-        table = np.empty(len(block), table_dtype(channel.kind, self.manifest.dof))
-        table["seq"] = block["seq"]
-        table["t"] = block["log_time"].astype(np.int64) - self.manifest.epoch_ns
-        table["iteration"] = block["iteration"]
-        for name in (f.name for f in FIELDS[channel.kind]):
-            if name == layout.ragged:
-                for i, offset in enumerate(offsets):
-                    table[name][i] = self._sequence(raw, int(offset), layout, block[name][i])
-            elif not _fits(block.dtype, table.dtype, name):
-                raise self.damaged(f"{channel.kind.label} has no such field {name!r} as it needs")
-            else:
-                table[name] = block[name]
-        return table
-
-    def _sequence(self, raw: bytes, offset: int, layout: Layout, count: int) -> NDArray[np.float64]:
-        begin, dof = offset + layout.sequence_at(), self.manifest.dof
-        if begin + 8 * int(count) > len(raw) or int(count) % dof:
-            raise self.damaged("a sequence reaches out of its chunk")
-        return np.frombuffer(raw, "<f8", int(count), begin).reshape(-1, dof).copy()
-
-
-def _fits(there: np.dtype[Any], wanted: np.dtype[Any], name: str) -> bool:
-    """Whether a field is there with as many numbers, and of a type that holds no others."""
-    if name not in (there.names or ()):
-        return False
-    a, b = there[name], wanted[name]
-    return a.shape == b.shape and np.can_cast(a.base, b.base)
-
-
-def _batches(path: Path, manifest: Manifest) -> Iterator[Events]:
-    """Yield the events of each chunk."""
-    decoder, figures = _Decoder(path, manifest), None
-    chunk: bytes | None = None
-    index: dict[int, NDArray[np.uint64]] = {}
-    with opened(path) as file:
-        try:
-            for opcode, data in records_of(path, file, check_end=True):
+            for opcode, data in records_of(path, file):
+                behind = file.tell()
                 if opcode == Opcode.MESSAGE_INDEX:
-                    channel, offsets = decoder.index(data)
-                    index[channel] = offsets
+                    self._index(data, index)
                     continue
                 if chunk is not None:
-                    yield decoder.events(chunk, index)
+                    yield chunk, index
                     chunk, index = None, {}
                 if opcode == Opcode.CHUNK:
-                    chunk = data
-                elif opcode == Opcode.MESSAGE:
-                    raise decoder.damaged("a message outside of a chunk, as brrt writes none")
-                elif opcode == Opcode.METADATA:
-                    metadata = metadata_of(path, data)
-                    figures = figures_of(path, metadata) if metadata.name == RESULT else figures
+                    chunk, begun = data, behind - len(data) - 9
+                else:
+                    self._look(opcode, data)
+            self._sound = True
+            check_summary(path, file)
+        except ReplacedError:
+            raise
         except CutError as error:
-            if chunk is not None:
-                yield decoder.events(chunk, index)
-            raise CutError(error.fault, figures) from None
+            why = f"damaged behind byte {behind:,}: a record is not what it says"
+            decoder.note(DamagedError(path, why) if ends_as_mcap(file) else error)
+        except RecordingError as error:
+            decoder.note(error)
+        if chunk is not None:
+            yield chunk, index
+        return begun
+
+    def _index(self, data: bytes, index: Index) -> None:
+        try:
+            channel, offsets = self.decoder.index(data)
+        except RecordingError as error:
+            self.decoder.note(error)
+        else:
+            index[channel] = offsets
+
+    def _look(self, opcode: int, data: bytes) -> None:
+        """Look at a record between two chunks."""
+        if opcode == Opcode.MESSAGE:
+            why = "a message outside of a chunk, as brrt writes none"
+            self.decoder.note(self.decoder.damaged(why))
+        elif opcode == Opcode.METADATA:
+            try:
+                metadata = metadata_of(self._path, data)
+                if metadata.name == RESULT:
+                    self._figures = figures_of(self._path, metadata)
+            except RecordingError as error:
+                self.decoder.note(error)
+            else:
+                self._same = self._same or metadata.metadata == self._texts
+                if metadata.name == RUN and not self._same:
+                    raise ReplacedError(self._path)
+
+    def judge(self) -> None:
+        """See whether all events were there.
+
+        Raises:
+            BrokenError: They were not, or something else is wrong with the file.
+            ReplacedError: It is another file by now.
+        """
+        if not self._same:
+            raise ReplacedError(self._path)
+        count, wrong, end = self.decoder.numbering.next, self.decoder.wrong, ending(self._path)
+        stated = None if end.counts is None else sum(end.counts.values())
+        if self._figures is not None:
+            stated = self._figures.get("events")
+            if wrong is None and stated != count:
+                why = f"damaged: {stated} events were written, {count} are there"
+                wrong = DamagedError(self._path, why)
+        if wrong is not None:
+            complete = self._sound if stated is None else stated == count
+            ended = end.ended or self._figures is not None
+            raise wrong.judged(complete=complete and not self.decoder.over, ended=ended)

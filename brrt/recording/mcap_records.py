@@ -5,6 +5,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from io import BytesIO
+from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
@@ -14,7 +15,7 @@ from mcap.opcode import Opcode
 
 from brrt.errors import RecordingError
 from brrt.recording.container import MAGIC
-from brrt.recording.sound import MOST_BYTES, CutError
+from brrt.recording.sound import MOST_BYTES, CutError, DamagedError
 
 _BLOCK = 1 << 20
 _MOST_BARREN = 1 << 17
@@ -51,7 +52,7 @@ def parsed(path: Path, kind: Any, data: bytes) -> Any:
     try:
         return kind.read(ReadDataStream(BytesIO(data)))
     except Exception as error:  # noqa: BLE001 - mcap raises whatever a damaged length leads to
-        raise RecordingError(f"{path}: damaged {kind.__name__}: {error}") from None
+        raise DamagedError(path, f"damaged {kind.__name__}: {str(error) or repr(error)}") from None
 
 
 def sealed(texts: Mapping[str, str]) -> dict[str, str]:
@@ -68,7 +69,7 @@ def metadata_of(path: Path, data: bytes) -> records.Metadata:
     metadata: records.Metadata = parsed(path, records.Metadata, data)
     stated = metadata.metadata.pop(SEAL, None)
     if stated is not None and stated != _seal(metadata.metadata):
-        raise RecordingError(f"{path}: damaged: the checksum of {metadata.name} does not match")
+        raise DamagedError(path, f"damaged: the checksum of {metadata.name} does not match")
     return metadata
 
 
@@ -85,17 +86,16 @@ def attachment_of(path: Path, data: bytes) -> records.Attachment:
     attachment: records.Attachment = parsed(path, records.Attachment, data)
     stated = struct.unpack("<I", data[-4:])[0]
     if stated and stated != zlib.crc32(data[:-4]):  # 0 is for none
-        raise RecordingError(f"{path}: damaged: the checksum of {attachment.name} does not match")
+        raise DamagedError(path, f"damaged: the checksum of {attachment.name} does not match")
     return attachment
 
 
-def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and content of each record of the data section, DataEnd included.
+def records_of(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and content of each record of the data section, DataEnd if that is right.
 
     Args:
         path: The file, for messages.
         file: Open behind its magic.
-        check_end: See that checksum, summary and footer are there and right.
 
     Raises:
         CutError: The file ends before that.
@@ -105,29 +105,25 @@ def records_of(path: Path, file: IO[bytes], *, check_end: bool) -> Iterator[tupl
     while True:
         head = file.read(9)
         if len(head) < 9:
-            raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
+            raise CutError(path, f"the file is cut at byte {file.tell():,}")
         opcode, length = struct.unpack("<BQ", head)
         if not any(head):  # a disk that lost its power may fill up what it did not write
-            raise CutError(f"{path}: the file is cut at byte {file.tell() - 9:,}: zeros follow")
+            raise CutError(path, f"the file is cut at byte {file.tell() - 9:,}: zeros follow")
         barren = 0 if opcode == Opcode.CHUNK else barren + 1
         if barren > _MOST_BARREN:
-            raise RecordingError(
-                f"{path}: damaged near byte {file.tell():,}: {barren:,} records without an event"
-            )
+            why = f"damaged near byte {file.tell():,}: {barren:,} records without an event"
+            raise DamagedError(path, why)
         if length > MOST_BYTES:
-            raise RecordingError(
-                f"{path}: damaged near byte {file.tell():,}: a record of {length} bytes"
-            )
+            why = f"damaged near byte {file.tell():,}: a record of {length} bytes"
+            raise DamagedError(path, why)
         data = _up_to(file, length)
         if len(data) < length:
-            raise CutError(f"{path}: the file is cut at byte {file.tell():,}")
+            raise CutError(path, f"the file is cut at byte {file.tell():,}")
         if opcode == Opcode.DATA_END:
             stated = parsed(path, records.DataEnd, data).data_section_crc
+            if stated and stated != crc:
+                raise DamagedError(path, "damaged: the checksum of the data differs")
             yield opcode, data
-            if check_end:
-                if stated and stated != crc:
-                    raise RecordingError(f"{path}: damaged: the checksum of the data differs")
-                check_summary(path, file)
             return
         crc = zlib.crc32(data, zlib.crc32(head, crc))
         yield opcode, data
@@ -142,11 +138,17 @@ def check_summary(path: Path, file: IO[bytes]) -> None:
     """
     rest = _up_to(file, MOST_BYTES)
     if not rest.endswith(MAGIC) or len(rest) < FOOTER + len(MAGIC):
-        raise CutError(f"{path}: the file is cut at byte {file.tell():,}, behind the last event")
+        raise CutError(path, f"the file is cut at byte {file.tell():,}, behind the last event")
     # All but the checksum itself, which is the footer's last field.
     body, crc = rest[: -len(MAGIC) - 4], rest[-len(MAGIC) - 4 : -len(MAGIC)]
     if zlib.crc32(body) != struct.unpack("<I", crc)[0]:
-        raise RecordingError(f"{path}: damaged: the checksum of the summary differs")
+        raise DamagedError(path, "damaged: the checksum of the summary differs")
+
+
+def ends_as_mcap(file: IO[bytes]) -> bool:
+    """Whether a file has its last bytes, so that it was not cut."""
+    file.seek(-len(MAGIC), SEEK_END)
+    return file.read() == MAGIC
 
 
 def _up_to(file: IO[bytes], size: int) -> bytes:

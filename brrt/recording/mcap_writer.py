@@ -10,7 +10,7 @@ import numpy as np
 from mcap import records
 from numpy.typing import NDArray
 
-from brrt.errors import RecordingError
+from brrt.errors import WriteError
 from brrt.events import FIELDS, Events, Kind
 from brrt.manifest import Manifest
 from brrt.recording.cdr import Layout, definition
@@ -22,6 +22,9 @@ from brrt.worlds.world import World
 
 RUN, RESULT, WORLD = "brrt.run", "brrt.result", "world.json"
 """Names of the metadata and of the attachment."""
+
+LEFT = "what was written before is whole: replay it with --partial, or see brrt recover"
+"""What there is of a file whose disk filled up."""
 
 _CHUNK_EVENTS = 8000
 _CHUNK_SECONDS = 0.5
@@ -62,7 +65,7 @@ class McapSink:
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
             self._file.flush()
         except OSError as error:
-            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
+            raise WriteError(path, error.strerror or str(error)) from None
 
     def write(self, events: Events) -> None:
         """Take a batch; small ones are gathered into one chunk."""
@@ -100,10 +103,7 @@ class McapSink:
         try:
             yield
         except OSError as error:
-            raise RecordingError(
-                f"cannot go on writing {self._path}: {error.strerror or error}; "
-                f"what was written before is whole: replay it with --partial, or see brrt recover"
-            ) from None
+            raise WriteError(self._path, error.strerror or str(error), LEFT) from None
 
     def _write_chunk(self, events: Events | None) -> None:
         if events is None:

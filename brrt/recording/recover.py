@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from brrt.errors import BrrtError, RecordingError
+from brrt.errors import BrrtError, WriteError
 from brrt.files import replacing
+from brrt.recording import read
 from brrt.recording.mcap_writer import McapSink
 from brrt.recording.recording import Recording
-from brrt.recording.sound import CutError, DamagedError
+from brrt.recording.sound import BrokenError
 
 NOTE = "brrt.recovered"
 """Name of what a recovered file says of its origin."""
@@ -22,13 +23,14 @@ class Recovery:
         events: How many.
         until_s: When the last of them happened, in seconds of the run.
         lost: What is wrong with the file; None if it is whole.
-        ended: Whether the run came to its own end, so that only what stands behind its events was
-            lost.
+        complete: Whether those are all events, so that only what stands beside them was lost.
+        ended: Whether, besides, the run came to its own end.
     """
 
     events: int
     until_s: float
     lost: str | None
+    complete: bool
     ended: bool
 
 
@@ -43,17 +45,19 @@ def recover(cut: Path | str, whole: Path | str) -> Recovery:
         whole: The new file, .mcap or .rrd; it is there once it is complete.
 
     Raises:
-        BrrtError: Nothing can be saved, or the file cannot be written.
+        RecordingError: The recording cannot be read, or nothing of it is sound.
+        BrrtError: The new file cannot be written.
     """
     cut, whole = Path(cut), Path(whole)
     if whole.exists() and cut.exists() and whole.samefile(cut):
         raise BrrtError(f"{whole}: is the recording itself; choose another name")
-    recording = _read(cut)
+    recording = read(cut)
     with replacing(whole) as unfinished:
         try:
             recovery = _rewrite(cut, recording, unfinished)
-        except RecordingError as error:
-            raise RecordingError(str(error).replace(str(unfinished), str(whole))) from None
+        except WriteError as error:
+            why = f"{error.reason}; nothing of it is left: name a file where there is more room"
+            raise WriteError(whole, why) from None
     return recovery
 
 
@@ -71,18 +75,6 @@ def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
     return recovery
 
 
-def _read(path: Path) -> Recording:
-    """Open a recording; where the checksum of an .rrd is wrong, those of its parts decide."""
-    from brrt.recording import read  # noqa: PLC0415 - it exports `recover`
-
-    try:
-        return read(path)
-    except DamagedError:
-        from brrt.recording.rrd_reader import read_rerun  # noqa: PLC0415 - pyarrow is slow to load
-
-        return read_rerun(path, in_parts=True)
-
-
 def _sink(path: Path, recording: Recording) -> Any:
     if path.suffix == ".rrd":
         from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
@@ -93,17 +85,15 @@ def _sink(path: Path, recording: Recording) -> Any:
 
 def _copy(recording: Recording, sink: Any) -> Recovery:
     """Hand a sink the events as far as they are sound."""
-    count, last, lost, ended = 0, 0, None, recording.result is not None
+    count, last = 0, 0
     batches = recording.batches()
     while True:
         try:
             batch = next(batches, None)
-        except CutError as error:
-            lost, ended, batch = error.fault, error.result is not None, None
-        except RecordingError as error:
-            lost, ended, batch = str(error), False, None
+        except BrokenError as error:
+            return Recovery(count, last / 1e9, error.fault, error.complete, error.ended)
         if batch is None:
-            return Recovery(count, last / 1e9, lost, ended)
+            return Recovery(count, last / 1e9, None, True, recording.result is not None)
         sink.write(batch)
         count, last = count + len(batch), max(last, batch.last.t)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import rerun as rr
 
-from brrt.errors import RecordingError
+from brrt.errors import WriteError
 from brrt.events import FIELDS, Events
 from brrt.manifest import Manifest
 from brrt.recording import viewer
@@ -148,7 +148,7 @@ class RerunSink:
             try:
                 stamp(self._path, self._drain.crc)
             except OSError as error:
-                raise RecordingError(f"cannot write {self._path}: {error.strerror}") from None
+                raise WriteError(self._path, error.strerror or str(error)) from None
 
     def _write_head(self, world: World) -> None:
         texts = {

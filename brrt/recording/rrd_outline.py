@@ -18,7 +18,7 @@ from brrt.recording.rrd_frames import (
     opened,
     unpacked,
 )
-from brrt.recording.sound import MOST_BYTES, CutError, DamagedError
+from brrt.recording.sound import MOST_BYTES, BrokenError, CutError, DamagedError
 from brrt.recording.stamp import is_damaged
 
 EVENTS, OURS = "/ev/", "/brrt/"
@@ -37,7 +37,8 @@ class Outline:
     Attributes:
         path: The file.
         texts: Named texts of each entity that has such.
-        places: Where the events are: kind, first byte, length.
+        places: Where the events are: kind, first byte, length, checksum of these bytes. Of a file
+            that is not whole, those that are proved to be.
         stopped: Why the rest of the file is of no use; None if it is whole.
         unpacked: Bytes that were decompressed so far.
         checked: Up to which byte its checks say that it is sound; 0 where it has none.
@@ -46,47 +47,41 @@ class Outline:
 
     path: Path
     texts: dict[str, dict[str, str]] = field(default_factory=dict)
-    places: list[tuple[Kind, int, int]] = field(default_factory=list)
-    stopped: RecordingError | None = None
+    places: list[tuple[Kind, int, int, int]] = field(default_factory=list)
+    stopped: BrokenError | None = None
     unpacked: int = 0
     checked: int = 0
     sound: int = 0
 
     @classmethod
-    def of(cls, path: Path, *, in_parts: bool = False) -> Self:
+    def of(cls, path: Path) -> Self:
         """Look through a file, after its checksum if it has one.
 
-        Args:
-            path: The file.
-            in_parts: Leave that checksum out, if there are others to find what is sound.
+        Where that is wrong, or the file was cut, the checksums of its parts say what is sound.
 
         Raises:
-            DamagedError: The checksum is wrong.
-            RecordingError: The file cannot be read, or is no such file.
+            RecordingError: The file cannot be read, is no such file, or nothing of it is sound.
         """
         try:
             with path.open("rb") as file:
                 magic = file.read(HEAD)[: len(MAGIC)]
             damaged = magic == MAGIC and is_damaged(path)
+            if magic != MAGIC:
+                raise RecordingError(f"{path}: not a Rerun recording")
+            outline = cls(path)
+            with path.open("rb") as file:
+                try:
+                    outline._read(file)
+                except BrokenError as error:
+                    outline.stopped = error
         except OSError as error:
             raise RecordingError(f"{path}: {error.strerror or error}") from None
-        if magic != MAGIC:
-            raise RecordingError(f"{path}: not a Rerun recording")
-        wrong = DamagedError(f"{path}: damaged: the checksum does not match")
-        if damaged and not in_parts:
-            raise wrong
-        outline = cls(path)
-        with path.open("rb") as file:
-            try:
-                outline._read(file)
-            except RecordingError as error:
-                outline.stopped = error
-        if damaged and not outline.checked:
-            raise wrong
-        if outline.checked and outline.stopped is not None:
+        if damaged and not isinstance(outline.stopped, DamagedError):  # it has all its bytes
+            outline.stopped = DamagedError(path, "damaged: the checksum does not match")
+        if outline.stopped is not None:
             del outline.places[outline.sound :]
-        elif damaged:
-            outline.stopped = wrong
+            if not outline.checked:
+                raise outline.stopped.in_front()
         return outline
 
     def _read(self, file: IO[bytes]) -> None:
@@ -94,7 +89,7 @@ class Outline:
 
         Raises:
             CutError: The file ends before its end.
-            RecordingError: It is damaged.
+            DamagedError: It is damaged.
         """
         size = file.seek(0, SEEK_END)
         file.seek(0)
@@ -110,7 +105,7 @@ class Outline:
                 rest = file.read(FRAME.size)
                 if rest and not any(rest) and not length and END not in self.texts:
                     # A disk that lost its power may fill up what it did not write.
-                    raise CutError(f"{self.path}: the file is cut at byte {at:,}: zeros follow")
+                    raise CutError(self.path, f"the file is cut at byte {at:,}: zeros follow")
                 return
             if length > MOST_BYTES:
                 raise self.damaged(at, f"a message of {length:,} bytes")
@@ -120,7 +115,7 @@ class Outline:
                 if check is not None:
                     self._hold(check, at, crc)
             crc, at = zlib.crc32(message, zlib.crc32(frame, crc)), body + length
-        raise CutError(f"{self.path}: the file is cut at byte {size:,}")
+        raise CutError(self.path, f"the file is cut at byte {size:,}")
 
     def _look(self, message: bytes, at: int, most: int) -> dict[str, str] | None:
         """Note where events are, and take in texts; return what is a check."""
@@ -135,7 +130,7 @@ class Outline:
                 return None
             entity, batches = opened(arrow)
             if entity in _KINDS:
-                self.places.append((_KINDS[entity], at, len(message)))
+                self.places.append((_KINDS[entity], at, len(message), zlib.crc32(message)))
             elif entity.startswith(OURS):
                 for batch in batches:
                     found = _texts(entity, batch)
@@ -152,15 +147,13 @@ class Outline:
         if check.get("bytes") != str(at):
             return
         if check.get("crc32") != str(crc):
-            raise RecordingError(
-                f"{self.path}: damaged between bytes {self.checked:,} and {at:,}: the checksum "
-                f"does not match"
-            )
+            why = f"damaged between bytes {self.checked:,} and {at:,}: the checksum does not match"
+            raise DamagedError(self.path, why)
         self.checked, self.sound = at, len(self.places)
 
-    def damaged(self, at: int, why: str) -> RecordingError:
+    def damaged(self, at: int, why: str) -> DamagedError:
         """Return the error for what is wrong near a byte."""
-        return RecordingError(f"{self.path}: damaged near byte {at:,}: {why}")
+        return DamagedError(self.path, f"damaged near byte {at:,}: {why}")
 
 
 def _texts(entity: str, batch: Any) -> dict[str, str]:

@@ -5,6 +5,7 @@ damage, and takes half a second to import.
 """
 
 import json
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -21,7 +22,15 @@ from brrt.manifest import Manifest
 from brrt.recording.recording import Recording
 from brrt.recording.rrd_frames import opened, unpacked
 from brrt.recording.rrd_outline import END, MANIFEST, WORLD, Outline, reason
-from brrt.recording.sound import CutError, Numbering, head, nothing_whole
+from brrt.recording.sound import (
+    BrokenError,
+    CutError,
+    DamagedError,
+    Numbering,
+    ReplacedError,
+    head,
+    in_front,
+)
 
 pa: Any = pyarrow  # mypy knows none of its names
 
@@ -31,41 +40,38 @@ TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
 _EVENTS_AT_ONCE = 1 << 16
 
 
-def read_rerun(path: Path, *, in_parts: bool = False) -> Recording:
+def read_rerun(path: Path) -> Recording:
     """Open a recording that `RerunSink` wrote.
 
-    Its batches raise `CutError` behind the last whole event of a file that was cut.
-
-    Args:
-        path: The file.
-        in_parts: Where its checksum is wrong, take what the checksums of its parts say is sound.
+    Its batches raise `CutError` behind the last event of a file that was cut that is proved whole,
+    and `DamagedError` of one that is damaged.
 
     Raises:
-        RecordingError: The file cannot be read, is damaged, or is no recording of brrt.
+        RecordingError: The file cannot be read, or is no recording of brrt.
     """
-    outline = Outline.of(path, in_parts=in_parts)
+    outline = Outline.of(path)
     if MANIFEST not in outline.texts or WORLD not in outline.texts:
-        if isinstance(outline.stopped, CutError):
-            raise nothing_whole(outline.stopped)
         raise outline.stopped or RecordingError(
             f"{path}: a Rerun file, but not a recording of brrt (no {MANIFEST})"
         )
     try:
         texts = json.loads(outline.texts[MANIFEST]["json"])
         manifest, world = head(path, dict(texts), outline.texts[WORLD]["json"])
-        end = outline.texts.get(END, {})
-        figures = dict(json.loads(end["result"])) if "result" in end else None
-        stated = dict(json.loads(end.get("counts", "{}")))
-        counts = {kind: int(stated[kind.label]) for kind in Kind if kind.label in stated}
+        figures, counts = (None, None) if outline.stopped else _ending(outline)
     except RecordingError:
         raise
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise RecordingError(f"{path}: damaged: {error!r}") from None
-    batches = partial(_batches, outline, manifest, figures)
-    whole = not outline.stopped
-    return Recording(
-        manifest, world, batches, figures if whole else None, counts if counts and whole else None
-    )
+        raise DamagedError(path, f"damaged: {error!r}") from None
+    return Recording(manifest, world, partial(_batches, outline, manifest), figures, counts)
+
+
+def _ending(outline: Outline) -> tuple[Mapping[str, Any] | None, Mapping[Kind, int] | None]:
+    """Return the figures and the events of each kind, as far as they are there."""
+    end = outline.texts.get(END, {})
+    figures = dict(json.loads(end["result"])) if "result" in end else None
+    stated = dict(json.loads(end.get("counts", "{}")))
+    counts = {kind: int(stated[kind.label]) for kind in Kind if kind.label in stated}
+    return figures, counts or None
 
 
 def _table(kind: Kind, dof: int, batch: Any) -> Table:
@@ -140,75 +146,84 @@ class _Pool:
         return Events(self.dof, tables)
 
 
-def _batches(
-    outline: Outline, manifest: Manifest, figures: Mapping[str, Any] | None
-) -> Iterator[Events]:
-    """Yield the events in order."""
+def _batches(outline: Outline, manifest: Manifest) -> Iterator[Events]:
+    """Yield the events in order, up to the first that is missing or not sound."""
     pool, numbering = _Pool(manifest.dof), Numbering()
-    with outline.path.open("rb") as file:
-        for kind, at, length in outline.places:
-            file.seek(at)
-            try:
-                _, batches = opened(unpacked(file.read(length)))
-                for batch in batches:
-                    pool.add(kind, _table(kind, manifest.dof, batch))
-                whole = pool.last + 1 == numbering.next + pool.count
-                ready = _sliced(pool.take(), numbering) if whole else []
-            except Exception as error:  # noqa: BLE001 - whatever damage leads pyarrow to
-                raise outline.damaged(at, reason(error)) from None
-            yield from ready
+    wrong: BrokenError | None = None
+    for kind, at, message in _messages(outline):
+        try:
+            _, batches = opened(unpacked(message))
+            for batch in batches:
+                pool.add(kind, _table(kind, manifest.dof, batch))
+        except Exception as error:  # noqa: BLE001 - whatever damage leads pyarrow to
+            wrong = outline.damaged(at, reason(error))
+            break
+        if pool.last + 1 == numbering.next + pool.count:
+            ready, unsound = numbering.beginning(pool.take())
+            yield from _sliced(ready)
+            if unsound is not None:
+                wrong = outline.damaged(at, str(unsound))
+                break
+    first, waiting = numbering.next, pool.count
+    rest, unsound = numbering.beginning(in_front(pool.take(), first))
+    yield from _sliced(rest)
+    missing = pool.last >= numbering.next
+    if unsound is None and not missing and waiting > numbering.next - first:
+        unsound = BrrtError("events are there twice")
+    if unsound is not None:
+        wrong = wrong or DamagedError(outline.path, f"damaged: {unsound}")
+    _check_end(outline, numbering.next, missing=missing, wrong=wrong)
+
+
+def _messages(outline: Outline) -> Iterator[tuple[Kind, int, bytes]]:
+    """Read the messages that hold events.
+
+    Raises:
+        RecordingError: They cannot be read, or are not those that were looked at.
+    """
     try:
-        rest = _sliced(_in_front(pool.take(), numbering.next), numbering)
-    except BrrtError as error:
-        raise RecordingError(f"{outline.path}: damaged: {error}") from None
-    yield from rest
-    _check_end(outline, numbering.next, figures, missing=pool.last >= numbering.next)
+        with outline.path.open("rb") as file:
+            for kind, at, length, crc in outline.places:
+                file.seek(at)
+                message = file.read(length)
+                if zlib.crc32(message) != crc:
+                    raise ReplacedError(outline.path)
+                yield kind, at, message
+    except OSError as error:
+        raise RecordingError(f"{outline.path}: {error.strerror or error}") from None
 
 
-def _sliced(events: Events, numbering: Numbering) -> list[Events]:
-    """Take in events, and return them in batches that are not too large."""
-    first = numbering.next
-    numbering.take(events)
+def _sliced(events: Events) -> Iterator[Events]:
+    """Divide events, of which none is missing, into batches that are not too large."""
     if len(events) <= _EVENTS_AT_ONCE:
-        return [events] if len(events) else []
-    parts = []
-    for begin in range(first, numbering.next, _EVENTS_AT_ONCE):
+        if len(events):
+            yield events
+        return
+    first, _ = events.kinds_in_order()
+    for begin in range(first, first + len(events), _EVENTS_AT_ONCE):
         tables = {}
         for kind, table in events.tables.items():
             low, high = np.searchsorted(table["seq"], (begin, begin + _EVENTS_AT_ONCE))
             if low < high:
                 tables[kind] = table[low:high]
-        parts.append(Events(events.dof, tables))
-    return parts
+        yield Events(events.dof, tables)
 
 
-def _in_front(events: Events, first: int) -> Events:
-    """Return the events from a number on, as far as none is missing."""
-    n = len(events)
-    present = np.zeros(n + 1, np.bool_)
-    for table in events.tables.values():
-        places = table["seq"] - first
-        present[places[(places >= 0) & (places < n)]] = True
-    return events.until(seq=first + int(present.argmin()) - 1)
-
-
-def _check_end(
-    outline: Outline, count: int, figures: Mapping[str, Any] | None, *, missing: bool
-) -> None:
-    """See that no event is missing at the end.
+def _check_end(outline: Outline, count: int, *, missing: bool, wrong: BrokenError | None) -> None:
+    """See that the file is whole, and no event missing at the end.
 
     Raises:
         CutError: The file was cut, or was made of one that was.
-        RecordingError: It was not, and lacks events.
+        DamagedError: It is damaged, or lacks events.
     """
-    stated = outline.texts.get(END, {}).get("events")
-    if stated is not None and (stated != str(count) or missing):
-        raise RecordingError(
-            f"{outline.path}: damaged: {stated} events were written, {count} are there"
-        )
-    if isinstance(outline.stopped, CutError):
-        raise CutError(outline.stopped.fault, figures)
-    if outline.stopped is not None:
-        raise outline.stopped
-    if missing or stated is None:
-        raise CutError(f"{outline.path}: was made of a file that was cut: the end is missing")
+    end = outline.texts.get(END, {})
+    stated = end.get("events")
+    wrong = wrong or outline.stopped
+    if stated is not None and not wrong and (stated != str(count) or missing):
+        why = f"damaged: {stated} events were written, {count} are there"
+        wrong = DamagedError(outline.path, why)
+    if wrong is None and (missing or stated is None):
+        wrong = CutError(outline.path, "was made of a file that was cut: the end is missing")
+    if wrong is not None:
+        complete = stated == str(count) and not missing
+        raise wrong.judged(complete=complete, ended="result" in end)
