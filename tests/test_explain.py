@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import Kind, Memory, Polygon, Recording, Run, Scenario, World, make_world, read
+from brrt import BrrtError, Kind, Memory, Polygon, Recording, Run, Scenario, World, make_world, read
 from brrt.events import Reason, Source, table_dtype
 from brrt.manifest import Manifest
 from brrt.replay.explain import Advice, Explanation, explain
@@ -161,6 +161,17 @@ def test_every_planner_and_robot_is_explained(name: str) -> None:
         assert json.loads(json.dumps(found.as_dict(), allow_nan=False))
         assert found.rows()[1][0] == "outcome"
         assert len(found.advice) <= 3
+
+
+def test_a_recording_is_explained_at_its_end() -> None:
+    """A path is not taken for one: the message says how it becomes one."""
+    file = GOLDEN / "circles2d-chain.mcap"
+    assert str(explain(read(file))) == str(explain(read(file).at()))
+    for path in (file, str(file)):
+        with pytest.raises(BrrtError, match=r"brrt\.explain\(brrt\.read\('.*chain\.mcap'\)\)$"):
+            explain(path)  # type: ignore[arg-type]
+    with pytest.raises(BrrtError, match=r"not 5$"):
+        explain(5)  # type: ignore[arg-type]
 
 
 def test_a_planner_from_outside_is_explained() -> None:
@@ -318,6 +329,23 @@ def test_a_passage_that_nothing_came_near_is_not_blamed(brrt: Command) -> None:
     done = brrt("explain", "run.mcap").out
     assert "none came within" in " ".join(done.split())
     assert len(commands(done)) == 1
+
+
+def test_what_was_too_little_is_not_advised_again(brrt: Command) -> None:
+    """Planning anew gets a larger budget; steps are cut by ten at most, and not lengthened then."""
+    for planner in ("rrt", "rrt-connect", "rrt-star"):
+        args = ["--world", "passage2d:gap=0.2", "--planner", planner, "--iterations", 1500]
+        for _ in range(2):
+            brrt("plan", *args, "--param", "step=20", "--out", "run.mcap", "--force")
+            advised = commands(brrt("explain", "run.mcap").out)
+            assert advised
+            for words in advised:
+                more = int(words[words.index("--iterations") + 1])
+                assert more >= 6000
+                steps = [float(word[5:]) for word in words if word.startswith("step=")]
+                assert all(2 <= step <= 20 for step in steps)
+                assert not steps or more >= 1500 * 20 / steps[0]
+            args += ["--seed", 1]
 
 
 def test_a_branch_is_advised_to_branch(brrt: Command) -> None:

@@ -1,8 +1,10 @@
 """Why a run failed, or took long: figures computed from its recording, and what they suggest."""
 
 from dataclasses import dataclass
-from typing import Any
+from os import PathLike
+from typing import Any, Protocol
 
+from brrt.errors import BrrtError
 from brrt.replay.explain.advice import advise
 from brrt.replay.explain.facts import Facts, facts
 from brrt.replay.explain.gather import Gather
@@ -43,21 +45,40 @@ class Explanation:
         return {**self.facts.as_dict(), "advice": [each.as_dict() for each in self.advice]}
 
 
-def explain(moment: Moment, file: str = "") -> Explanation:
+class _Recorded(Protocol):
+    """A recording, as `brrt.read` returns it."""
+
+    def at(self) -> Moment:
+        """Return the run at its end."""
+
+
+def explain(run: Moment | _Recorded, file: str = "") -> Explanation:
     """Explain a run as it stood at an instant, in one pass over its events.
 
     Args:
-        moment: The run.
+        run: The run at an instant, or a recording: the run at its end.
         file: The recording, as commands that are advised name it; by default its own name.
 
     Raises:
-        BrrtError: The manifest's query is of no use in its world.
+        BrrtError: `run` is the path of a recording, or something else; or the manifest's query is
+            of no use in its world.
     """
+    moment = run if isinstance(run, Moment) else _end(run)
     robot = moment.manifest.make_robot().settled(moment.world)
     gather = Gather(moment.manifest, robot)
     moment.feed(gather)
     found = facts(moment, file or moment.name, robot, gather)
     return Explanation(found, advise(found))
+
+
+def _end(run: _Recorded) -> Moment:
+    if isinstance(run, str | PathLike):
+        raise BrrtError(
+            f"explain takes a recording, not its path: brrt.explain(brrt.read({str(run)!r}))"
+        )
+    if not hasattr(run, "at"):
+        raise BrrtError(f"explain takes a recording or a moment of one, not {run!r:.60}")
+    return run.at()
 
 
 __all__ = ["Advice", "Explanation", "Facts", "explain"]

@@ -5,8 +5,17 @@ from collections.abc import Callable, Mapping
 from brrt.planners import PLANNERS
 from brrt.replay.explain import failed
 from brrt.replay.explain.facts import Facts
-from brrt.replay.explain.proposal import Advice, change, further, go_on, look, recording, rounded
-from brrt.replay.explain.signs import limited, step_of, stuck
+from brrt.replay.explain.proposal import (
+    Advice,
+    anew,
+    change,
+    further,
+    go_on,
+    look,
+    recording,
+    rounded,
+)
+from brrt.replay.explain.signs import fitting_step, limited, step_of, stuck
 from brrt.replay.explain.tell import place
 
 MOST = 3
@@ -56,9 +65,12 @@ def short_step(f: Facts) -> Advice | None:
         return None
     reached = f"{f.accepted:,} steps of {step:g} reached {coverage.share:.0%} of the free space"
     wide = usual if f.narrow is None else min(usual, max(f.narrow.low, 2 * step))
+    # What `long_step` advises is not taken back.
+    if f.narrow is not None and f.narrow.parts and step >= min(rounded(fitting_step(f)), wide):
+        return None
     if stuck(f) and f.narrow is not None and wide > f.narrow.high:
         return None
-    return change(f, reached, params={"step": rounded(wide)})
+    return anew(f, reached, params={"step": rounded(wide)})
 
 
 def look_ahead(f: Facts) -> Advice | None:

@@ -4,13 +4,33 @@ import math
 
 from brrt.replay.explain.command import text
 from brrt.replay.explain.facts import Facts
-from brrt.replay.explain.proposal import Advice, change, further, go_on, look, recording, rounded
-from brrt.replay.explain.signs import grows, is_young, limited, step_of, stuck, width_of
+from brrt.replay.explain.proposal import (
+    Advice,
+    anew,
+    change,
+    further,
+    go_on,
+    look,
+    recording,
+    rounded,
+)
+from brrt.replay.explain.signs import (
+    fitting_step,
+    grows,
+    is_young,
+    limited,
+    step_of,
+    stuck,
+    width_of,
+)
 from brrt.replay.explain.tell import counted
 from brrt.replay.explain.way import at_least, at_most
 
 ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
 """What grows a second tree from the goal, instead of each planner."""
+
+MOST_CUT = 10
+"""A step is never advised to be more than so many times shorter."""
 
 _ENOUGH = 100
 """Extensions from which on a run's course means anything."""
@@ -61,14 +81,14 @@ def goal_bias(f: Facts) -> Advice | None:
     if bias is None or f.scenario.planner not in ONE_TREE:
         return None
     if bias == 0:
-        return change(f, "goal bias 0 never draws the goal", params={"goal_bias": 0.05})
+        return anew(f, "goal bias 0 never draws the goal", params={"goal_bias": 0.05})
     goals, samples = f.goals, f.figures["samples"]
     if goals is None or bias <= 0.2 or not samples or goals.failed < 0.9 * goals.drawn:
         return None
     by = f", most by {goals.blockers[0].name}" if goals.blockers else ""
     drawn = counted(goals.drawn, "goal")
     why = f"goal bias {bias:g} drew {drawn}, and {goals.failed:,} of them in vain{by}"
-    return change(f, why, params={"goal_bias": 0.05})
+    return anew(f, why, params={"goal_bias": 0.05})
 
 
 def young(f: Facts) -> Advice | None:
@@ -100,7 +120,7 @@ def second_tree(f: Facts) -> Advice | None:
     else:
         return None
     step = f.scenario.params.get("step")
-    return change(f, why, planner=planner, params={} if step is None else {"step": step})
+    return anew(f, why, planner=planner, params={} if step is None else {"step": step})
 
 
 def long_step(f: Facts) -> Advice | None:
@@ -109,7 +129,9 @@ def long_step(f: Facts) -> Advice | None:
     if step is None or not stuck(f) or f.narrow is None or step <= f.narrow.high:
         return None
     why = f"step {step:g} is longer than the passage {width_of(f)} wide, and no node got through"
-    return change(f, why, params={"step": rounded(max(f.narrow.low, f.narrow.high / 4))})
+    # A tenth of the step takes ten times the nodes to get as far: no less at once.
+    shorter = rounded(max(fitting_step(f), step / MOST_CUT))
+    return anew(f, why, max(4, step / shorter), params={"step": shorter})
 
 
 def unseen(f: Facts) -> Advice | None:

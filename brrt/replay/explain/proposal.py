@@ -11,6 +11,7 @@ from brrt.planners import PLANNERS
 from brrt.planners.drive import LoopPlanner
 from brrt.replay.explain.command import plan_words, setting_words
 from brrt.replay.explain.facts import Facts
+from brrt.replay.explain.signs import limited
 from brrt.replay.explain.tell import WIDTH
 from brrt.scenario import Scenario
 
@@ -173,14 +174,40 @@ def further(
         least: Iterations that are worth a try in any case.
         params: Settings of the planner that are changed.
     """
+    return go_on(f, why, params=params, **_budget(f, times, least))
+
+
+def anew(
+    f: Facts,
+    why: str,
+    times: float = 4,
+    *,
+    planner: str | None = None,
+    params: Mapping[str, Any] | None = None,
+) -> Advice:
+    """Advise to run the same with changes, and with a larger budget where it was used up.
+
+    Args:
+        f: What is known.
+        why: What the advice follows from.
+        times: How many times as large.
+        planner: Another planner; `params` are then all that is set.
+        params: Settings of the planner that are changed.
+    """
+    more = _budget(f, round(times), 1) if limited(f) else {}
+    return change(f, why, planner=planner, params=params, **more)
+
+
+def _budget(f: Facts, times: int, least: int) -> dict[str, Any]:
+    """Return a budget that is so many times as large, of the kind that ended the run."""
     if f.figures["status"] == "time limit" and f.scenario.time is not None:
-        return go_on(f, why, params=params, time=rounded(times * f.scenario.time))
+        return {"time": rounded(times * f.scenario.time)}
     done = max(f.figures["iterations"], 1)
     most = min(max(times * done, least), max(4 * done, _PLENTY))
-    return go_on(f, why, params=params, iterations=round(most, 1 - len(str(most))))
+    return {"iterations": round(most, 1 - len(str(most)))}
 
 
-def rounded(value: float) -> float:
-    """Round down to one digit."""
-    size = float(f"1e{f'{value:e}'.partition('e')[2]}")
+def rounded(value: float, digits: int = 1) -> float:
+    """Round down to a number of digits, as a rule to one."""
+    size = float(f"1e{f'{value:e}'.partition('e')[2]}") / 10 ** (digits - 1)
     return float(f"{int(value / size * (1 + 1e-12)) * size:.6g}")

@@ -35,6 +35,12 @@ def step_of(f: Facts) -> float | None:
     return None if f.contract is None else f.contract.step
 
 
+def fitting_step(f: Facts) -> float:
+    """Return the step that suits the narrowest place: shorter ones only take longer."""
+    assert f.narrow is not None  # noqa: S101 - the caller's
+    return max(f.narrow.low, f.narrow.high / 4)
+
+
 def width_of(f: Facts) -> str:
     """Write how wide the narrowest place is, where one is known."""
     assert f.narrow is not None  # noqa: S101 - the caller's
