@@ -199,7 +199,7 @@ def changed(
         if name in _CHANGEABLE:
             continue
         if name in (f.name for f in fields(Scenario)):
-            raise BrrtError(f"a branch keeps the {name} of its recording; leave {name} away")
+            raise BrrtError(f"a branch keeps the {name} of its recording; leave out {name}")
         raise unknown("setting of a branch", name, _CHANGEABLE)
     scenario = manifest.scenario
     values = {**scenario.as_dict(), **settings, "params": {**scenario.params, **params}}
@@ -250,5 +250,5 @@ def check_settled(before: LoopPlanner, now: LoopPlanner) -> None:
         if wanted != then:
             raise BrrtError(
                 f"{name} cannot be {wanted} from here on: the lattice was laid at the start, with "
-                f"{name} {then}; leave it away, or plan again"
+                f"{name} {then}; leave it out, or plan again"
             )

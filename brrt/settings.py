@@ -97,7 +97,7 @@ def pairs(owner: str, text: str) -> dict[str, str]:
         if not equals:
             raise BrrtError(f"{owner}: {part!r} must read name=value")
         if name.strip() in found:
-            raise BrrtError(f"{owner}: {name.strip()} is given twice; leave one of them away")
+            raise BrrtError(f"{owner}: {name.strip()} is given twice; leave one of them out")
         found[name.strip()] = value.strip()
     return found
 

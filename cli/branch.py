@@ -19,7 +19,7 @@ def check_parent(parent: Path, scenario: Path | None, *outputs: Path | None) -> 
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
 
     if scenario is not None:
-        raise BrrtError(f"--from goes on with the recorded scenario; leave {scenario} away")
+        raise BrrtError(f"--from goes on with the recorded scenario; leave out {scenario}")
     for path in outputs:
         if path is not None and path.exists() and parent.exists() and path.samefile(parent):
             raise BrrtError(

@@ -287,7 +287,7 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
     for message, options in {
         "is the recording that --from goes on from": ("--from", "run.mcap", "--out", "run.mcap"),
         "say where to branch": ("--at-event", 3),
-        "leave x.toml away": ("x.toml", "--from", "run.mcap"),
+        "leave out x.toml": ("x.toml", "--from", "run.mcap"),
         "keeps the planner of its recording": ("--from", "run.mcap", "--planner", "rrt"),
     }.items():
         refused = brrt("plan", *options, "--force")

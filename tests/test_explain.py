@@ -202,6 +202,8 @@ CASES: dict[str, tuple[list[str], str]] = {
                        "--from run.mcap --iterations 30000"),
     "coarse cells": (["--world", "passage2d:gap=3", "--planner", "a-star", "--param", "epsilon=7"],
                      "epsilon="),
+    "much too coarse cells": (["--world", "passage2d:gap=0.2", "--planner", "a-star", "--param",
+                               "epsilon=7"], "--iterations"),
 }  # fmt: skip
 
 
@@ -272,8 +274,11 @@ def test_a_walled_off_goal_needs_a_look(brrt: Command) -> None:
     World("walled", np.zeros(2), np.full(2, 100.0), boxes=boxes, **ends).save("walled.json")  # type: ignore[arg-type]
     brrt("plan", "--world", "walled.json", "--iterations", 500, "--out", "run.mcap")
     found = brrt("explain", "run.mcap", "--json").json
-    assert [each["command"] for each in found["advice"]] == ["brrt worlds show walled.json"]
-    assert "there is no way from start to goal" in found["advice"][0]["why"]
+    assert [each["command"] for each in found["advice"]] == ["brrt plot run.mcap --out run-1.png"]
+    assert (
+        "no way from start to goal: a closed wall of obstacles stands between them"
+        in found["advice"][0]["why"]
+    )
 
 
 def test_what_improves_no_more_is_said(brrt: Command) -> None:

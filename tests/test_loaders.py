@@ -125,7 +125,7 @@ def test_parameters_and_queries_reach_the_loader(folder: Path) -> None:
         lambda: make_world(f"{folder}/image.pgm:resolution=0")
     )
     assert refused(lambda: make_world(f"{folder}/grid.map#1")) == (
-        f"{folder}/grid.map: there is nothing to choose in it; leave '#1' away"
+        f"{folder}/grid.map: there is nothing to choose in it; leave out '#1'"
     )
 
 

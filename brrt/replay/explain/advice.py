@@ -81,8 +81,8 @@ def look_ahead(f: Facts) -> Advice | None:
         return None
     deepest = f.cells["deepest"]
     why = (
-        f"each cell was entered {often:.3g} times; the estimate at {place(deepest['q'])} had to "
-        f"rise by {deepest['learnt']:.4g}"
+        f"each cell was entered {often:.3g} times on average; the estimate at "
+        f"{place(deepest['q'])} had to rise by {deepest['learnt']:.4g}"
     )
     if limited(f):  # what was learnt stays right whatever the lookahead is
         return further(f, why, 10, params={"lookahead": min(10_000, max(100, 10 * lookahead))})

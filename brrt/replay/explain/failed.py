@@ -2,7 +2,6 @@
 
 import math
 
-from brrt.replay.explain.command import text
 from brrt.replay.explain.facts import Facts
 from brrt.replay.explain.proposal import (
     Advice,
@@ -23,7 +22,7 @@ from brrt.replay.explain.signs import (
     stuck,
     width_of,
 )
-from brrt.replay.explain.tell import counted
+from brrt.replay.explain.tell import counted, late
 from brrt.replay.explain.way import at_least, at_most
 
 ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
@@ -31,6 +30,12 @@ ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
 
 MOST_CUT = 10
 """A step is never advised to be more than so many times shorter."""
+
+_FITS = 0.8
+"""Cells are advised of so many times the width of the passage that they are to fit."""
+
+_ROOM = 30_000_000
+"""Cells beyond which no lattice is advised."""
 
 _ENOUGH = 100
 """Extensions from which on a run's course means anything."""
@@ -40,11 +45,11 @@ _SPREADING = 0.15
 
 
 def no_way(f: Facts) -> Advice | None:
-    """There is no way: look at the map before anything else."""
+    """There is no way: look at the picture before anything else."""
     if f.way.connected is not False:
         return None
     why = f"there is no way from start to goal: {f.way.reason}"
-    return look(why, "worlds", "show", f.scenario.world, *_ends(f))
+    return look(why, "plot", recording(f), suffix=".png")
 
 
 def too_wide(f: Facts) -> Advice | None:
@@ -65,14 +70,29 @@ def small_cells(f: Facts) -> Advice | None:
         return None
     cells = f"cells of {lattice.epsilon:g}"
     if f.narrow is None:
-        why = f"{cells} show no path, and {f.way.reason}"
-        return change(f, why, params={"epsilon": lattice.epsilon / 4})
-    if lattice.epsilon <= f.narrow.low / 4:
+        return _finer(f, f"{cells} show no path, and {f.way.reason}", lattice.epsilon / 4)
+    # A line of the lattice leads through any straight passage along an axis that is wider than a
+    # cell; through one that runs askew, or bends, none may until cells are smaller still.
+    fitting = rounded(_FITS * max(f.narrow.low, f.narrow.high / 4), 2)
+    if lattice.epsilon <= fitting:
         why = f"{cells} show no path, though the passage is {width_of(f)} wide"
-        return change(f, why, params={"epsilon": lattice.epsilon / 2})
-    epsilon = rounded(max(f.narrow.low, f.narrow.high / 4) / 4)
-    why = f"{cells} are large for a passage {width_of(f)} wide"
+        return _finer(f, why, rounded(lattice.epsilon / 2, 2))
+    return _finer(f, f"{cells} are large for a passage {width_of(f)} wide", fitting)
+
+
+def _finer(f: Facts, why: str, epsilon: float) -> Advice:
+    """Advise smaller cells and as many expansions; of too many cells, a planner without any."""
+    cells = _cells(f, epsilon)
+    if cells > _ROOM:
+        return change(f, f"{why}; of {epsilon:g} there are {cells:.2g}", planner="rrt-connect")
+    if cells > f.scenario.make_stop().iterations:
+        return change(f, why, params={"epsilon": epsilon}, iterations=cells)
     return change(f, why, params={"epsilon": epsilon})
+
+
+def _cells(f: Facts, epsilon: float) -> int:
+    """Return how many cells the bounds hold."""
+    return math.prod(int(side / epsilon) + 1 for side in f.sides)
 
 
 def goal_bias(f: Facts) -> Advice | None:
@@ -146,7 +166,7 @@ def all_cells(f: Facts) -> Advice | None:
     lattice = None if f.contract is None else f.contract.lattice
     if lattice is None or lattice.lookahead is not None or f.figures["status"] != "iteration limit":
         return None
-    cells = math.prod(int(side / lattice.epsilon) + 1 for side in f.sides)
+    cells = _cells(f, lattice.epsilon)
     if cells <= f.figures["iterations"]:
         return None
     why = (
@@ -164,20 +184,17 @@ def longer(f: Facts) -> Advice | None:
         why = f"{f.coverage.late:.0%} of what was reached came in the run's last third"
         times = min(100, max(4, round(2 / f.coverage.share)))
     elif f.approach is not None and f.approach.since <= 0.3:
-        why = f"it came nearer to the goal until the last {f.approach.since:.0%} of the run"
+        why = f"it came nearer to the goal {late(f.approach.since)}"
         times = 10
     else:
         return None
-    return further(f, f"{why}: it was still growing", times)
+    going = "getting somewhere" if f.cells else "growing"
+    return further(f, f"{why}: it was still {going}", times)
 
 
 def anything(f: Facts) -> Advice | None:
     """The budget ended the run, and nothing else has anything to say."""
     if not limited(f):
         return None
-    return further(f, "the budget ended the run, and no figure tells that it was stuck", 10)
-
-
-def _ends(f: Facts) -> list[str]:
-    names = [name for name in ("start", "goal") if getattr(f.scenario, name) is not None]
-    return [f"--{name}={text(getattr(f.manifest, name))}" for name in names]
+    why = "the budget ended the run, and no other figure tells why it found no path"
+    return further(f, why, 10)

@@ -11,6 +11,9 @@ Row = tuple[str, str]
 WIDTH = 79
 """Columns that are written to: the last one of 80 stays free."""
 
+_END = 0.005
+"""Of a run, what is too little to name in percent."""
+
 
 def rows(f: Facts) -> Iterator[Row]:
     """Tell the facts, the outcome first."""
@@ -38,7 +41,8 @@ def _outcome(f: Facts) -> str:
         found = f"with a path of {_g(figures['path_cost'])}" if figures["solved"] else "not solved"
         return f"cut short, {found}: the recording breaks off after {effort}"
     if figures["solved"]:
-        ended = "" if figures["status"] == "solved" else f", ended by: {figures['status']}"
+        status = figures["status"]
+        ended = {"solved": "", "running": "; planning goes on"}.get(status, f", ended by: {status}")
         return f"solved, a path of {_g(figures['path_cost'])} after {effort}{ended}"
     if figures["status"] == "running":
         return f"not solved yet after {effort}"
@@ -139,13 +143,13 @@ def _goal(f: Facts) -> Iterator[Row]:
             "nearest",
             (
                 f"{what} {near.node:,} at {place(near.q)}, {_g(near.far)} from the goal "
-                f"(the start: {_g(near.start)}); none nearer in the last {near.since:.0%}{hit}"
+                f"(the start: {_g(near.start)}); {_since(near.since)}{hit}"
             ),
         )
     if f.gap is not None:
         hit = f"; between them {f.gap.hit}" if f.gap.hit else ""
         ends = f"{place(f.gap.q)} and {place(f.gap.other)}"
-        yield "gap", f"the trees are at most {_g(f.gap.far)} apart, at {ends}{hit}"
+        yield "gap", f"the trees come within {f.gap.far:.4g} of each other, at {ends}{hit}"
     goals = f.goals
     if goals is not None:
         told = []
@@ -156,6 +160,17 @@ def _goal(f: Facts) -> Iterator[Row]:
             told.append(f"out of reach by the last motion {counted(goals.blocked, 'time')}")
         by = ", ".join(f"{each.name} {each.share:.0%}" for each in goals.blockers[:2])
         yield "goal", "; ".join(told) + (f"; by {by}" if by else "")
+
+
+def _since(share: float) -> str:
+    if share < _END:
+        return f"it came nearer {late(share)}"
+    return f"none nearer in the last {share:.0%}"
+
+
+def late(share: float) -> str:
+    """Write until when a run got somewhere, by the share of it that came after."""
+    return "up to the very end" if share < _END else f"until the last {share:.0%} of the run"
 
 
 def _paths(f: Facts) -> Iterator[Row]:
@@ -183,10 +198,12 @@ def _cells(f: Facts) -> Iterator[Row]:
     if not cells or not cells["moves"] or "lookahead" not in f.scenario.settings():
         return
     busiest, deepest = cells["busiest"], cells["deepest"]
+    often = cells["moves_per_cell"]
+    entered = "once" if often == 1 else f"{often:.3g} times on average"
     yield (
         "moves",
         (
-            f"{cells['moves']:,}; each cell was entered {cells['moves_per_cell']:.3g} times, "
+            f"{cells['moves']:,}; each cell was entered {entered}, "
             f"that at {place(busiest['q'])} {counted(busiest['visits'], 'time')}"
         ),
     )

@@ -116,7 +116,9 @@ class Ways:
             return Way(known.connected, known.reason, body=self._body)
         bound = self._widest(ends)
         if bound == 0:
-            return Way(False, "cells that obstacles fill part them", None, 0.0, self._body)
+            return Way(
+                False, "a closed wall of obstacles stands between them", None, 0.0, self._body
+            )
         reason = f"cells of {known.cell:.3g} are too coarse to show one"
         if bound is not None:
             reason += f"; it is at most {at_most(bound)} wide"

@@ -102,7 +102,7 @@ def nothing_to_choose(path: Path, query: str) -> None:
         BrrtError: There is a query.
     """
     if query:
-        raise BrrtError(f"{path}: there is nothing to choose in it; leave '#{query[:40]}' away")
+        raise BrrtError(f"{path}: there is nothing to choose in it; leave out '#{query[:40]}'")
 
 
 def finite(where: str, words: Sequence[str]) -> list[float]:
