@@ -353,6 +353,30 @@ def test_what_was_too_little_is_not_advised_again(brrt: Command) -> None:
             args += ["--seed", 1]
 
 
+def test_draws_of_the_goal_that_took_long_are_told(brrt: Command) -> None:
+    """Of a run that was solved all the same; with fewer of them it takes less long."""
+    args = ["--world", "bugtrap2d", "--param", "goal_bias=0.3"]
+    assert brrt("plan", *args, "--out", "run.mcap").code == 0
+    done = brrt("explain", "run.mcap").out
+    facts = brrt("explain", "run.mcap", "--json").json
+    share = f"{facts['goals']['failed'] / facts['figures']['iterations']:.0%}"
+    assert f"({share} of the iterations)" in " ".join(done.split())
+    assert f"in vain, most by {facts['goals']['blockers'][0]['name']}" in " ".join(done.split())
+    words = commands(done)[0]
+    assert "goal_bias=0.05" in words
+    assert brrt(*words).code == 0
+    assert "--param goal_bias" not in brrt("explain", "run-1.mcap").out
+
+
+def test_a_cramped_body_gets_a_planner_that_costs_less(brrt: Command) -> None:
+    """Hardly an extension is accepted: nobody says that the tree was spreading."""
+    brrt("plan", "--world", "polygons2d", "--robot", "polygon:length=8,width=4", "--planner",
+         "bi-rrt-star", "--iterations", 3000, "--out", "run.mcap")  # fmt: skip
+    done = brrt("explain", "run.mcap").out
+    assert "spreading" not in done
+    assert any("rrt-connect" in words for words in commands(done))
+
+
 def test_a_branch_is_advised_to_branch(brrt: Command) -> None:
     """From itself, for all that a branch can change; and it names its parent."""
     few, tiny = (CASES[name][0] for name in ("few iterations", "tiny step"))

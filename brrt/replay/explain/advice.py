@@ -155,11 +155,11 @@ def slow_tree(f: Facts) -> Advice | None:
 _LOOKS: tuple[Rule, ...] = (failed.no_way, failed.too_wide)
 _UNSOLVED: tuple[Rule, ...] = (
     *_LOOKS, cut_short, failed.small_cells, failed.goal_bias, short_step, failed.young,
-    failed.unseen, failed.second_tree, failed.long_step, look_ahead, failed.all_cells,
-    failed.longer,
+    failed.unseen, failed.second_tree, failed.cramped, failed.long_step, look_ahead,
+    failed.all_cells, failed.longer,
 )  # fmt: skip
 _SOLVED: tuple[Rule, ...] = (
-    cut_short, late_moves, short_step, slow_tree, look_ahead, enough, informed,
+    cut_short, late_moves, failed.goal_bias, short_step, slow_tree, look_ahead, enough, informed,
 )  # fmt: skip
 
 _INSTEAD: Mapping[Rule, tuple[Rule, ...]] = {
@@ -168,6 +168,7 @@ _INSTEAD: Mapping[Rule, tuple[Rule, ...]] = {
     failed.goal_bias: (failed.young, failed.longer),
     short_step: (failed.young, failed.second_tree, failed.longer),
     failed.young: (failed.unseen, failed.longer),
+    failed.second_tree: (failed.cramped,),
     failed.unseen: (failed.longer,),
     failed.all_cells: (failed.longer,),
     look_ahead: (failed.longer,),

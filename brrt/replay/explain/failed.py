@@ -1,6 +1,7 @@
 """What to try after a run that found no path: rules, each from figures to a command."""
 
 import math
+from typing import Any
 
 from brrt.replay.explain.facts import Facts
 from brrt.replay.explain.proposal import (
@@ -18,6 +19,7 @@ from brrt.replay.explain.signs import (
     grows,
     is_young,
     limited,
+    scarce,
     step_of,
     stuck,
     width_of,
@@ -27,6 +29,9 @@ from brrt.replay.explain.way import at_least, at_most
 
 ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
 """What grows a second tree from the goal, instead of each planner."""
+
+_CHEAPER = {"bi-rrt-star": "rrt-connect", "rrt-star": "rrt"}
+"""What looks for a first path alone, with as many trees, instead of each planner."""
 
 MOST_CUT = 10
 """A step is never advised to be more than so many times shorter."""
@@ -56,9 +61,11 @@ def too_wide(f: Facts) -> Advice | None:
     """No way is wide enough for the body: searching on would not help."""
     if not f.way.too_narrow or f.way.widest is None:
         return None
+    # The row of the way tells what was measured: another bound beside it would only confuse.
+    widest = f"at most {at_most(f.way.widest)}" if f.narrow is None else width_of(f)
     why = (
         f"no pose of this body fits through: it is at least {at_least(f.way.body)} wide, the "
-        f"widest way at most {at_most(f.way.widest)}"
+        f"widest way {widest}"
     )
     return look(why, "plot", recording(f), suffix=".png")
 
@@ -70,7 +77,10 @@ def small_cells(f: Facts) -> Advice | None:
         return None
     cells = f"cells of {lattice.epsilon:g}"
     if f.narrow is None:
-        return _finer(f, f"{cells} show no path, and {f.way.reason}", lattice.epsilon / 4)
+        # Half of what no way is wider than, or a quarter of the cells where these are smaller yet.
+        most = math.inf if f.way.widest is None else f.way.widest / 2
+        epsilon = rounded(min(lattice.epsilon / 4, most), 2)
+        return _finer(f, f"{cells} show no path, and {f.way.reason}", epsilon)
     # A line of the lattice leads through any straight passage along an axis that is wider than a
     # cell; through one that runs askew, or bends, none may until cells are smaller still.
     fitting = rounded(_FITS * max(f.narrow.low, f.narrow.high / 4), 2)
@@ -96,18 +106,19 @@ def _cells(f: Facts, epsilon: float) -> int:
 
 
 def goal_bias(f: Facts) -> Advice | None:
-    """The goal was never drawn, or most draws of it were in vain."""
+    """The goal was never drawn, or draws of it took much of the run in vain."""
     bias = f.scenario.settings().get("goal_bias")
     if bias is None or f.scenario.planner not in ONE_TREE:
         return None
-    if bias == 0:
+    if bias == 0 and not f.figures["solved"]:
         return anew(f, "goal bias 0 never draws the goal", params={"goal_bias": 0.05})
-    goals, samples = f.goals, f.figures["samples"]
-    if goals is None or bias <= 0.2 or not samples or goals.failed < 0.9 * goals.drawn:
+    goals = f.goals
+    share = 0.0 if goals is None else goals.failed / max(f.figures["iterations"], 1)
+    if goals is None or share <= 0.2 or goals.failed < 0.5 * goals.drawn or bias <= 0.05:
         return None
     by = f", most by {goals.blockers[0].name}" if goals.blockers else ""
-    drawn = counted(goals.drawn, "goal")
-    why = f"goal bias {bias:g} drew {drawn}, and {goals.failed:,} of them in vain{by}"
+    drawn = f"{counted(goals.drawn, 'goal')}, and {goals.failed:,} of them in vain{by}"
+    why = f"goal bias {bias:g} drew {drawn}: {share:.0%} of the run"
     return anew(f, why, params={"goal_bias": 0.05})
 
 
@@ -119,9 +130,23 @@ def young(f: Facts) -> Advice | None:
     times = min(100, max(10, round(8 / c.share)))
     why = (
         f"{counted(f.figures['iterations'], 'iteration')} reached {c.share:.0%} of the free space, "
-        f"and {c.single:.0%} of that with a single node: the tree was still spreading"
+        f"and {c.single:.0%} of that with a single node"
     )
-    return further(f, why, times)
+    return further(f, why if scarce(f) else f"{why}: the tree was still spreading", times)
+
+
+def cramped(f: Facts) -> Advice | None:
+    """Hardly an extension is accepted, and the tree does not get away: keep it cheap, and many."""
+    planner = _CHEAPER.get(f.scenario.planner)
+    if planner is None or not limited(f) or not scarce(f) or f.acceptance is None:
+        return None
+    if f.accepted + f.failed < _ENOUGH or f.approach is None or f.approach.since < 0.5:
+        return None
+    why = (
+        f"of {f.accepted + f.failed:,} extensions {f.acceptance:.1%} were accepted, and none came "
+        f"nearer to the goal in the last {f.approach.since:.0%} of the run"
+    )
+    return anew(f, why, 10, planner=planner, params=_same_step(f))
 
 
 def second_tree(f: Facts) -> Advice | None:
@@ -139,8 +164,7 @@ def second_tree(f: Facts) -> Advice | None:
         why = f"no node came nearer to the goal in the last {f.approach.since:.0%} of the run"
     else:
         return None
-    step = f.scenario.params.get("step")
-    return anew(f, why, planner=planner, params={} if step is None else {"step": step})
+    return anew(f, why, planner=planner, params=_same_step(f))
 
 
 def long_step(f: Facts) -> Advice | None:
@@ -152,6 +176,12 @@ def long_step(f: Facts) -> Advice | None:
     # A tenth of the step takes ten times the nodes to get as far: no less at once.
     shorter = rounded(max(fitting_step(f), step / MOST_CUT))
     return anew(f, why, max(4, step / shorter), params={"step": shorter})
+
+
+def _same_step(f: Facts) -> dict[str, Any]:
+    """Return the step that was set, for another planner."""
+    step = f.scenario.params.get("step")
+    return {} if step is None else {"step": step}
 
 
 def unseen(f: Facts) -> Advice | None:

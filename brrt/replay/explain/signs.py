@@ -1,12 +1,16 @@
 """Signs that rules go by: what figures say of a run as a whole."""
 
 from brrt.replay.explain.facts import Facts
+from brrt.replay.explain.way import at_most
 
 _GROWING = 0.05
 """Of what was reached, the part that must have come in the last third of a run that grows."""
 
 _FRESH = 0.2
 """Of the cells that were reached, the part with a single node in a tree that is young."""
+
+_SCARCE = 0.1
+"""Of the extensions, the part that is hardly any."""
 
 
 def limited(f: Facts) -> bool:
@@ -18,6 +22,11 @@ def is_young(f: Facts) -> bool:
     """Whether the tree had reached little, and much of that by a single node."""
     c = f.coverage
     return c is not None and not f.cells and c.share < 0.5 and c.single >= _FRESH
+
+
+def scarce(f: Facts) -> bool:
+    """Whether hardly an extension was accepted, in little of the free space."""
+    return is_young(f) and f.acceptance is not None and f.acceptance < _SCARCE
 
 
 def stuck(f: Facts) -> bool:
@@ -42,6 +51,9 @@ def fitting_step(f: Facts) -> float:
 
 
 def width_of(f: Facts) -> str:
-    """Write how wide the narrowest place is, where one is known."""
+    """Write how wide the narrowest place is, where one is known: as measured, or as proven."""
     assert f.narrow is not None  # noqa: S101 - the caller's
-    return f"{max(f.narrow.low, 0):.3g} to {f.narrow.high:.3g}"
+    low, high, proven = max(f.narrow.low, 0), f.narrow.high, f.way.widest
+    if proven is not None and low <= proven < high:
+        return f"{low:.3g} to {at_most(proven)}"
+    return f"{low:.3g} to {high:.3g}"

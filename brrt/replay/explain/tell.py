@@ -1,15 +1,20 @@
 """An explanation in words: rows of a name and what there is to say, for a screen of 80 columns."""
 
 from collections.abc import Iterator, Sequence
+from math import dist
 from textwrap import wrap
 
 from brrt.replay.explain.facts import Facts
+from brrt.replay.explain.signs import width_of
 from brrt.replay.explain.way import Narrow, at_least
 
 Row = tuple[str, str]
 
 WIDTH = 79
 """Columns that are written to: the last one of 80 stays free."""
+
+_SOME = 0.05
+"""Of the iterations, what is told of the goal's rejected draws."""
 
 _END = 0.005
 """Of a run, what is too little to name in percent."""
@@ -113,16 +118,25 @@ def _way(f: Facts) -> str:
             return f"there is one: the run found it, but {f.way.reason}"
         known = {True: "there is one", False: "there is none", None: "unknown"}[f.way.connected]
         return f"{known}: {'the run found it' if solved else f.way.reason}"
-    width = f"{max(narrow.low, 0):.3g} to {narrow.high:.3g} wide where it is narrowest"
-    told = [f"the widest one is {width}, at {place(narrow.q)}"]
+    width = f"{width_of(f)} wide where it is narrowest"
+    told = [f"the widest one is {width}, {_where(f, narrow)}"]
     if f.way.body and narrow.low < f.way.body:
         told.append(f"this body is at least {at_least(f.way.body)} wide")
     if solved and narrow.crossed is not None:
         way = "leads through there" if narrow.crossed else "takes another way"
         told.append(f"the path {way}")
-    if narrow.parts and not (solved and len(f.trees) > 1):
+    if narrow.parts and not (solved and (len(f.trees) > 1 or not narrow.crossed)):
         told.append(_passed(narrow, "cell" if f.cells else "node"))
     return "; ".join(told)
+
+
+def _where(f: Facts, narrow: Narrow) -> str:
+    """Write where the narrowest place is; that of start or goal itself is no passage."""
+    at = f"at {place(narrow.q)}"
+    for name, end in (("start", f.manifest.start), ("goal", f.manifest.goal)):
+        if dist(narrow.q, end[: len(narrow.q)]) <= narrow.high and f.way.body == 0:
+            return f"{at}, close to the {name}"
+    return at
 
 
 def _passed(narrow: Narrow, what: str) -> str:
@@ -155,7 +169,9 @@ def _goal(f: Facts) -> Iterator[Row]:
         told = []
         if goals.drawn:
             drawn, failed = (counted(n, "time") for n in (goals.drawn, goals.failed))
-            told.append(f"drawn {drawn}, rejected {failed}")
+            share = goals.failed / max(f.figures["iterations"], 1)
+            of_all = f" ({share:.0%} of the iterations)" if share >= _SOME else ""
+            told.append(f"drawn {drawn}, rejected {failed}{of_all}")
         if goals.blocked:
             told.append(f"out of reach by the last motion {counted(goals.blocked, 'time')}")
         by = ", ".join(f"{each.name} {each.share:.0%}" for each in goals.blockers[:2])
