@@ -353,6 +353,24 @@ def test_what_was_too_little_is_not_advised_again(brrt: Command) -> None:
             args += ["--seed", 1]
 
 
+def test_a_corner_of_the_start_is_no_passage() -> None:
+    """Where a maze's way is narrowest in the start's own cell, it says so; not in open space."""
+    for world, told in (("maze2d", True), ("empty2d", False), ("passage2d:gap=1", False)):
+        way = dict(explained(Scenario(world=world, iterations=50, seed=1)).rows())["way"]
+        assert ("close to the start" in way) == told
+
+
+def test_a_lattice_is_told_in_its_own_words() -> None:
+    """It enters a cell once, not 1 times, and is nowhere said to grow."""
+    scenario = Scenario(world="empty2d", planner="lrta-star", params={"epsilon": 3}, iterations=20)
+    found = explained(scenario)
+    rows = dict(found.rows())
+    assert rows["moves"] == "20; each cell was entered once"
+    assert "it came nearer up to the very end" in rows["nearest"]
+    assert "growing" not in str(found)
+    assert "planning goes on" in dict(explained(STAR, iteration=200).rows())["outcome"]
+
+
 def test_draws_of_the_goal_that_took_long_are_told(brrt: Command) -> None:
     """Of a run that was solved all the same; with fewer of them it takes less long."""
     args = ["--world", "bugtrap2d", "--param", "goal_bias=0.3"]

@@ -13,6 +13,9 @@ Row = tuple[str, str]
 WIDTH = 79
 """Columns that are written to: the last one of 80 stays free."""
 
+_CORNER = 0.1
+"""Of the map's longest side, how far a corner of it reaches."""
+
 _SOME = 0.05
 """Of the iterations, what is told of the goal's rejected draws."""
 
@@ -134,7 +137,8 @@ def _where(f: Facts, narrow: Narrow) -> str:
     """Write where the narrowest place is; that of start or goal itself is no passage."""
     at = f"at {place(narrow.q)}"
     for name, end in (("start", f.manifest.start), ("goal", f.manifest.goal)):
-        if dist(narrow.q, end[: len(narrow.q)]) <= narrow.high and f.way.body == 0:
+        near = min(narrow.high, _CORNER * f.extent)
+        if f.way.body == 0 and dist(narrow.q, end[: len(narrow.q)]) <= near:
             return f"{at}, close to the {name}"
     return at
 
@@ -215,14 +219,11 @@ def _cells(f: Facts) -> Iterator[Row]:
         return
     busiest, deepest = cells["busiest"], cells["deepest"]
     often = cells["moves_per_cell"]
-    entered = "once" if often == 1 else f"{often:.3g} times on average"
-    yield (
-        "moves",
-        (
-            f"{cells['moves']:,}; each cell was entered {entered}, "
-            f"that at {place(busiest['q'])} {counted(busiest['visits'], 'time')}"
-        ),
-    )
+    entered = "each cell was entered once"
+    if busiest["visits"] > 1:
+        most = f"that at {place(busiest['q'])} {counted(busiest['visits'], 'time')}"
+        entered = f"each cell was entered {often:.3g} times on average, {most}"
+    yield "moves", f"{cells['moves']:,}; {entered}"
     if deepest["learnt"] > 0:
         yield (
             "learnt",
