@@ -116,13 +116,16 @@ def branching_point(recorded: Recorded, limits: Mapping[str, int]) -> tuple[int,
     """Find the iteration to branch behind; see `last_whole_iteration`.
 
     Raises:
-        BrrtError: Planning had ended before.
+        BrrtError: Planning had ended before, or nothing was recorded.
     """
+    if not any(map(len, recorded.batches())):
+        raise BrrtError(f"{called(recorded)}: it holds no event to branch behind")
     iteration, status = last_whole_iteration(recorded.batches(), limits)
     if "iteration" in limits and limits["iteration"] > iteration:
+        end = "it breaks off behind" if status is None else "planning ended with"
         raise BrrtError(
-            f"{called(recorded)}: planning ended with iteration {iteration:,}; branch there at the "
-            "latest, and what follows planning is made anew"
+            f"{called(recorded)}: {end} iteration {iteration:,}; branch there at the latest, and "
+            "what follows planning is made anew"
         )
     return max(iteration, 0), status
 

@@ -200,7 +200,8 @@ class _Ending:
                 f" in iteration {self.draws:,}" if self.draws else ""
             )
         if self.cut:
-            return f"the recording breaks off behind event {self.events - 1:,}"
+            place = f"behind event {self.events - 1:,}" if self.events else "ahead of any event"
+            return f"the recording breaks off {place}"
         return f"the clock ended planning in iteration {self.draws:,}" if self.by_clock else ""
 
 

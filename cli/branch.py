@@ -42,6 +42,7 @@ def go_on(
         BrrtError: There is nothing to go on from, or a setting is of no use.
     """
     from brrt.again import BranchedRun  # noqa: PLC0415
+    from brrt.branch import last_whole_iteration  # noqa: PLC0415
     from brrt.errors import RecordingError  # noqa: PLC0415
     from brrt.recording import BrokenError, read  # noqa: PLC0415
 
@@ -49,9 +50,12 @@ def go_on(
     try:
         run = BranchedRun(read(parent), params=params, seed=seed, settings=given, **limits)
     except BrokenError as error:
+        last, _ = last_whole_iteration(read(parent, partial=True).batches(), {})
+        if last < 0:
+            raise RecordingError(f"{error.fault}; nothing of planning is whole") from None
         raise RecordingError(
-            f"{error.fault}; branch before that (--at-iteration), or save what is whole first: "
-            f"brrt recover {parent} --out whole.mcap"
+            f"{error.fault}; it is whole as far as iteration {last:,}: branch there at the latest "
+            f"(--at-iteration {last})"
         ) from None
     here = run.manifest.branches[-1]
     note(

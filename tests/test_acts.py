@@ -144,11 +144,11 @@ DOCTORED: list[tuple[str, str, Callable[[], Evidence], set[str]]] = [
          "outcome", "smoothed", "shortcuts", "random pairs"}),
     ("phase contents", "move outside of all phases",
      lambda: retold(swapped, "executed", Kind.MOVE, -1), {"phases", "endings"}),
-    ("iterations", "sample of iteration", lambda: change("rrt", Kind.SAMPLE, 9, iteration=9), {
-        "times"}),
-    ("iterations", "told in iteration", lambda: retold(dropped, "a-star", Kind.EXPAND, -1), SEARCH),
-    ("iterations", "move of iteration", lambda: change("lrta-star", Kind.MOVE, 5, iteration=5), {
-        "times"}),
+    ("iterations", "event of iteration 9; the log counts",
+     lambda: change("rrt", Kind.SAMPLE, 9, iteration=9), {"times"}),
+    ("iterations", "; the log counts", lambda: retold(dropped, "a-star", Kind.EXPAND, -1), SEARCH),
+    ("iterations", "event of iteration 5; the log counts",
+     lambda: change("lrta-star", Kind.MOVE, 5, iteration=5), {"times"}),
     ("told once", "the same reject", lambda: retold(doubled, "rrt", Kind.REJECT, 3), MESS),
     ("told once", "the same rewire", lambda: retold(doubled, "rrt-star", Kind.REWIRE, 3), MESS),
     ("told once", "the same connect", lambda: retold(doubled, "bi-rrt-star", Kind.CONNECT), MESS),

@@ -69,8 +69,8 @@ class Decoder:
     def damaged(self, why: str) -> DamagedError:
         """Return the error for what is wrong behind the events so far."""
         last = self.numbering.next - 1
-        place = "ahead of the first event" if last < 0 else f"after event {last:,}"
-        return DamagedError(self.path, f"damaged {place}: {why}")
+        place = "" if last < 0 else f" after event {last:,}"
+        return DamagedError(self.path, f"damaged{place}: {why}")
 
     def index(self, data: bytes) -> tuple[int, NDArray[np.uint64]]:
         """Read where a channel's messages are in the chunk ahead."""

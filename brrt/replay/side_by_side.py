@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from brrt.replay.compare import METRICS, TIMES, Comparison, Cut
@@ -127,7 +128,8 @@ def _parting(found: Comparison) -> Iterator[str]:
             yield "The settings alone differ."
         return
     yield from parting(first, ("A", "B"), (found.cuts[0] is not None, found.cuts[1] is not None))
-    if all(found.names):
+    # Of runs in memory a name is not one that a command takes.
+    if all(name and Path(name).exists() for name in found.names):
         a, b = (shlex.quote(name) for name in found.names)
         partial = " --partial" if any(found.cuts) else ""
         yield ""

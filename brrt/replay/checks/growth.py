@@ -136,10 +136,13 @@ def _look_steered(case: Case, tally: Tally, contract: Contract, tree: Grown, pai
     wrong = (node < 0) | (said & ~close) | ~(off <= CLOSE * step + case.blur)
     wrong &= ~(tied & ~said)
     rows = np.flatnonzero(near.looked)
-    tally.look(done[rows], wrong[rows], lambda i: _astray(to, due, node, int(rows[i])))
+    origin = np.where(said & ~close, origin, -1)
+    tally.look(done[rows], wrong[rows], lambda i: _astray(to, due, node, origin, int(rows[i])))
 
 
-def _astray(to: Floats, due: Floats, node: Ints, i: int) -> str:
+def _astray(to: Floats, due: Floats, node: Ints, origin: Ints, i: int) -> str:
+    if origin[i] >= 0:
+        return f"an extension to {text(to[i])} from node {origin[i]}; the nearest is {node[i]}"
     if node[i] < 0:
         return f"an extension to {text(to[i])}, to where no node leads"
     return f"an extension to {text(to[i])}; from the nearest node it leads to {text(due[i])}"

@@ -113,9 +113,9 @@ def _naming(name: str, values: NDArray[np.uint8]) -> Callable[[int], str]:
 
 def outcome(case: Case, tally: Tally) -> None:
     """A run that says it is solved has a path; one that says there is none has none."""
-    ends = case.events[Kind.PHASE][-1:]
-    event = ends[0] if len(ends) else None
-    wrong = None
+    phases = case.events[Kind.PHASE]
+    ends = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)][-1:]
+    event, wrong = ends[0] if len(ends) else None, None
     if case.outcome is Status.SOLVED and not case.found:
         wrong = "planning ended as solved, but there is no path"
     elif case.found and case.outcome is not None and case.outcome not in _with_path(case):
@@ -230,7 +230,8 @@ def figures(case: Case, tally: Tally) -> Windows:
     for name, figure in metrics.as_dict().items():
         if name in stated:
             wrong = not _same_figure(stated[name], figure)
-            said = " ".join(f"{name} is {stated[name]!r}, by the events {figure!r}".split())
+            said = f"{name} is {stated[name]!r} at its end, {figure!r} by what stands before"
+            said = " ".join(said.split())
             tally.one(None, f"{said:.160}" if wrong else None)
 
 
