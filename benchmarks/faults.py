@@ -51,8 +51,8 @@ SMALL = (
 )
 PATIENCE_S = 5.0
 LOSS_S, CHUNK = 1.0, 1 << 16
-TELL_EACH, INTERRUPTED = 20, 130
-MEMORY = 6 << 30
+TELLS, INTERRUPTED = 20, 130
+MEMORY = 2 << 30
 
 
 def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
@@ -317,7 +317,7 @@ def told(numbers: range, what: str) -> Iterator[int]:
     for number in numbers:
         done = number - numbers.start
         last = number == numbers.stop - 1
-        if sys.stderr.isatty() or done % TELL_EACH == 0 or last:
+        if sys.stderr.isatty() or done % max(1, len(numbers) // TELLS) == 0 or last:
             passed = time.perf_counter() - began
             left = f", {passed / done * (len(numbers) - done):.0f} s left" if done else ""
             line = f"{what}: {number:,} of {numbers.stop:,} after {passed:.0f} s{left}"
@@ -348,6 +348,13 @@ def look_at(what: Callable[..., Iterator[str]], numbers: range, seed: int) -> in
     return findings
 
 
+def bound_memory() -> None:
+    """Let a spoiled file take so much and no more; Rerun keeps threads for each file it wrote."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    most = pages * resource.getpagesize() + MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
 def main() -> int:
     """Do both; print figures and findings."""
     parser = argparse.ArgumentParser(
@@ -363,12 +370,13 @@ def main() -> int:
         with contextlib.suppress(KeyboardInterrupt):
             nursery()
         return 0
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     findings = 0
     for what, count in ((kills, args.kills), (copies, args.copies)):
         numbers = range(args.first, count)
         if not numbers:
             continue
+        if what is copies:
+            bound_memory()
         try:
             findings += look_at(what, numbers, args.seed)
         except KeyboardInterrupt:
