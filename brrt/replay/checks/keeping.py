@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Reason, Table, table_dtype
+from brrt.events import Events, Kind, Reason, Table
 from brrt.planners.contract import Contract
 
 
@@ -42,6 +42,34 @@ class Thinned:
         return rows
 
 
+class _Rows:
+    """Rows of a long table, as they come.
+
+    They stand in one block of which each is twice as large as the one before: large blocks go back
+    to the system, where many small ones would leave holes as large as the whole.
+    """
+
+    def __init__(self) -> None:
+        self._block: Table | None = None
+        self._count = 0
+
+    def add(self, rows: Table) -> None:
+        """Take in the next rows; the first are not copied."""
+        if self._block is None:
+            self._block, self._count = rows, len(rows)
+            return
+        first, self._count = self._count, self._count + len(rows)
+        if self._count > len(self._block):
+            larger = np.empty(max(self._count, 2 * len(self._block)), rows.dtype)
+            larger[:first] = self._block[:first]
+            self._block = larger
+        self._block[first : self._count] = rows
+
+    def table(self) -> Table | None:
+        """Return them; None where there are none."""
+        return None if self._block is None else self._block[: self._count]
+
+
 class Kept:
     """The events that rules look at once the whole log has been read.
 
@@ -59,7 +87,7 @@ class Kept:
 
     def __init__(self, dof: int, contract: Contract) -> None:
         self._dof, self._contract = dof, contract
-        self._parts: dict[Kind, list[Table]] = {kind: [] for kind in Kind}
+        self._rows: dict[Kind, _Rows] = {kind: _Rows() for kind in Kind}
         self.last_iteration = self.count = 0
 
     def take(self, window: Events) -> None:
@@ -71,7 +99,7 @@ class Kept:
             self.last_iteration = max(self.last_iteration, int(table["iteration"].max()))
             rows = self._needed(kind, table)
             if rows is not None:
-                self._parts[kind].append(table if rows.all() else table[rows])
+                self._rows[kind].add(table if rows.all() else table[rows])
 
     def _needed(self, kind: Kind, table: Table) -> NDArray[np.bool_] | None:
         if kind is Kind.SAMPLE:
@@ -83,18 +111,6 @@ class Kept:
         return np.ones(len(table), bool)
 
     def events(self) -> Events:
-        """Join what was kept; each part makes way for the whole as it is copied."""
-        tables = {}
-        for kind, parts in self._parts.items():
-            if len(parts) == 1:
-                tables[kind] = parts[0]
-            elif parts:
-                table = np.empty(sum(map(len, parts)), table_dtype(kind, self._dof))
-                at = len(table)
-                while parts:
-                    part = parts.pop()
-                    table[at - len(part) : at] = part
-                    at -= len(part)
-                tables[kind] = table
-        self._parts = {kind: [] for kind in Kind}
-        return Events(self._dof, tables)
+        """Return what was kept."""
+        tables = {kind: rows.table() for kind, rows in self._rows.items()}
+        return Events(self._dof, {k: table for k, table in tables.items() if table is not None})

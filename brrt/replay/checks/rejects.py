@@ -95,7 +95,7 @@ def _look_at_trees(case: Case, tally: Tally, table: Table) -> None:
     # Trees that rewire head for each other's nodes without the aim of joining them.
     links = reason == Reason.LINK_BLOCKED
     to_newest = np.zeros(len(table), bool)
-    for tree in case.trees:
+    for tree in (tree for tree in case.trees if len(tree.edges)):
         theirs = np.flatnonzero(table["tree"] == 1 - tree.number)
         newest = np.searchsorted(tree.edges["seq"], table["seq"][theirs]) - 1
         ends = np.asarray(tree.edges["q"])[newest]

@@ -171,8 +171,11 @@ def rewires_near(case: Case, tally: Tally) -> None:
 def rewires_free(case: Case, tally: Tally) -> None:
     """The edge to a new parent is free of obstacles."""
     for tree in case.trees:
-        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
-        table, q = tree.rewires[sound], np.asarray(tree.edges["q"])
+        sound, q = tree.of_rewires(tree.ledger.verdict == SOUND), np.asarray(tree.edges["q"])
+        # Where events are out of order, the verdicts are those of others.
+        for name in ("parent", "node"):
+            sound = sound & (tree.rewires[name] >= 0) & (tree.rewires[name] < len(q))
+        table = tree.rewires[sound]
         case.look_free(
             tally, table, q[table["parent"]], q[table["node"]], "the edge to node", "node"
         )
