@@ -52,7 +52,7 @@ SMALL = (
 PATIENCE_S = 5.0
 LOSS_S, CHUNK = 1.0, 1 << 16
 TELLS, INTERRUPTED = 20, 130
-MEMORY = 2 << 30
+MEMORY = 6 << 30
 
 
 def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
