@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from brrt import BranchedRun, Memory, Recording, Run, Scenario, World
-from brrt.replay.explain import Advice, explain
+from brrt.explanation import Advice, explain
 
 SEEDS = 10
 

@@ -24,9 +24,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from brrt import Events, Kind, Memory, Run, Scenario
-from brrt.replay.checks import examine
-from tests.doctoring import doctors
-from tests.scenarios import PLANNERS, ROBOTS, SEARCHES, command, draw
+from brrt.verification import examine
+from tests.support.doctoring import doctors
+from tests.support.scenarios import PLANNERS, ROBOTS, SEARCHES, command, draw
 
 LEAST, MOST = 60, 2500
 """Events of runs that are doctored."""

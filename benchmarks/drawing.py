@@ -18,8 +18,8 @@ import rerun as rr
 
 from brrt import Events, Memory, Run, Scenario
 from brrt.events import FIELDS
-from brrt.recording.columns import to_arrow
-from brrt.recording.rerun import RerunSink
+from brrt.views.rerun.arrow import to_arrow
+from brrt.views.rerun.sink import RerunSink
 
 RUNS: dict[str, dict[str, Any]] = {
     "rrt, 2D": {"world": "enclosure2d", "params": {"step": 0.3, "goal_bias": 0}},

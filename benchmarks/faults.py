@@ -37,9 +37,9 @@ from typing import IO, Any, cast
 from mcap.reader import make_reader
 
 from brrt import BrrtError, Events, McapSink, Run, Scenario, first_difference, read
-from brrt.recording.background import Background
-from brrt.recording.recover import recover
-from brrt.recording.rerun import RerunSink
+from brrt.formats.background import Background
+from brrt.formats.recover import recover
+from brrt.views.rerun.sink import RerunSink
 
 NAMES = ("run.mcap", "run.rrd")
 ENDLESS = Scenario(world="circles2d", seed=1, smooth=False, iterations=10**9,

@@ -46,7 +46,7 @@ with (
 
     for module in SEEN:
         import_module(module)
-    from tests.world_files import GOOD, spoiled, write
+    from tests.support.world_files import GOOD, spoiled, write
 
 LONGEST = 1 << 16
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from brrt import Events, Kind, Run, Scenario, World, make_world
-from brrt.planners.stop import Stop
+from brrt.planners.base.stop import Stop
 
 OBSTACLES = (100, 1_000, 10_000, 100_000)
 COVERED = 0.1

@@ -18,7 +18,7 @@ import numpy as np
 
 from brrt import Events, McapSink, Memory, Run, Scenario
 from brrt.events import Kind
-from brrt.recording.background import Background
+from brrt.formats.background import Background
 
 SIDE = 512
 ENDS = (Kind.PHASE, Kind.PATH)

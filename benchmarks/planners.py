@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from brrt import Events, Kind, McapSink, Run, Scenario, World, read
-from brrt.recording.background import Background
+from brrt.formats.background import Background
 
 PEER = Path(__file__).with_name("ompl_peer.cpp")
 

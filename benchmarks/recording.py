@@ -17,12 +17,12 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from brrt.events import Events, Kind
-from brrt.recording import McapSink, Memory, read_mcap
-from brrt.recording.background import Background
-from brrt.recording.cdr import definition
-from brrt.recording.mcap_writer import channel_of
-from brrt.run import Run, Sink
-from brrt.scenario import Scenario
+from brrt.formats import McapSink, Memory, read_mcap
+from brrt.formats.background import Background
+from brrt.formats.mcap.cdr import definition
+from brrt.formats.mcap.writer import channel_of
+from brrt.runs.run import Run, Sink
+from brrt.scenario.scenario import Scenario
 
 # An obstacle field that the step cannot pass, so that the run makes the events it is asked for.
 WORLD = "boxes3d:n=200,size=100,min_side=5,max_side=15"
@@ -85,7 +85,7 @@ def plan_seconds(events: int, folder: Path, kinds: tuple[str, ...]) -> tuple[flo
         path = folder / "run.mcap"
         sinks.append(Background(McapSink(path, run.manifest, run.problem.world)))
     if "rrd" in kinds:
-        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - optional here
+        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - optional here
 
         path = folder / "run.rrd"
         sinks.append(Background(RerunSink(run.manifest, run.problem.world, path=path)))

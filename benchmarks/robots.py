@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from brrt import Robot, World, make_robot, make_world
 from brrt.kernels.jit import kernel
-from brrt.kernels.space import segment_free
+from brrt.kernels.spaces.space import segment_free
 from brrt.robots import Polygon
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ def main() -> None:
     for name, unsettled in ROBOTS.items():
         for spec in WORLDS:
             world = make_world(spec)
-            robot = unsettled.settled(world)
+            robot = unsettled.resolved(world)
             space = robot.space(world)
             A, B = edges(robot, world, space, options.edges)
             free, times = np.zeros(len(A), np.bool_), []

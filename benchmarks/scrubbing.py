@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from brrt import Kind, Run, Scenario
-from brrt.recording.drive import Cursor, headless, shoot
-from brrt.recording.rerun import RerunSink
+from brrt.views.rerun.sink import RerunSink
+from brrt.views.viewer.control import Cursor, headless, shoot
 
 RUNS: dict[str, dict[str, Any]] = {
     "rrt": {"world": "enclosure2d", "params": {"step": 0.3, "goal_bias": 0}},

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from brrt import Grid, World, make_robot, make_world
 from brrt.kernels.jit import kernel
-from brrt.kernels.space import segment_free
+from brrt.kernels.spaces.space import segment_free
 
 Floats = NDArray[np.float64]
 

@@ -20,10 +20,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from brrt import Events, Memory, Run, Scenario
-from brrt.replay import checks
-from brrt.replay.checks import bets, draws, examine
-from tests.scenarios import LINKS, PLANNERS, ROBOTS, command, draw
+from brrt import Events, Memory, Run, Scenario, verification
+from brrt.verification import e_process, examine
+from brrt.verification.rules import sampling
+from tests.support.scenarios import LINKS, PLANNERS, ROBOTS, command, draw
 
 LINE = "{:14} {:10} {:>7} {:>7} {:>10} {:>9}"
 EVERY = 100
@@ -63,12 +63,12 @@ def hold(scenario: Scenario, counts: dict[tuple[str, str], Counter[str]]) -> lis
 
 def accused(run: Run, events: Events) -> bool:
     """Whether draws are found fault with where that may happen to one sound run in 20."""
-    rules, alarm = checks.RULES, bets.ALARM
-    checks.RULES, bets.ALARM = draws.RULES, LOOSE
+    rules, alarm = verification.RULES, e_process.ALARM
+    verification.RULES, e_process.ALARM = sampling.RULES, LOOSE
     try:
         return any(t.broken for t in examine(run.manifest, run.problem.world, events))
     finally:
-        checks.RULES, bets.ALARM = rules, alarm
+        verification.RULES, e_process.ALARM = rules, alarm
 
 
 def main() -> int:

@@ -19,8 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from brrt import McapSink, Run, Scenario, read
-from brrt.replay import checks
+from brrt import McapSink, Run, Scenario, read, verification
 
 # No goal is ever reached by those that would stop at it.
 NEVER = {"goal_bias": 0.0, "step": 0.02}
@@ -81,13 +80,13 @@ def timed(rule: Callable[..., Any], spent: Counter[str]) -> Callable[..., Any]:
 def judge(path: Path) -> dict[str, Any]:
     """Read and judge a recording; return the figures."""
     spent: Counter[str] = Counter()
-    checks.RULES = tuple(timed(rule, spent) for rule in checks.RULES)
+    verification.RULES = tuple(timed(rule, spent) for rule in verification.RULES)
     recording = read(path)
     began = time.process_time()
     events = sum(map(len, recording.batches()))
     reading = time.process_time() - began
     began, since = time.process_time(), time.perf_counter()
-    tallies = checks.examine(recording.manifest, recording.world, recording.batches())
+    tallies = verification.examine(recording.manifest, recording.world, recording.batches())
     return {
         "events": events,
         "reading": reading,

@@ -11,26 +11,26 @@ PYTEST_DONT_REWRITE: whoever imports brrt ahead of pytest is not to be warned, a
 packages that bring a plugin.
 """
 
-from brrt.again import BranchedRun, RepeatedRun
+from brrt.comparison.comparison import Comparison
+from brrt.comparison.events import Difference, first_difference
+from brrt.comparison.versus import compare
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
-from brrt.manifest import Manifest
+from brrt.explanation import Explanation, explain
+from brrt.formats import McapSink, Memory, Recording, read
 from brrt.planners import PLANNERS, RRT, Planner
-from brrt.problem import Problem
-from brrt.recording import McapSink, Memory, Recording, read
-from brrt.recording.versus import compare
-from brrt.repeat import Again, plan_again
-from brrt.replay.checks import Finding, check
-from brrt.replay.compare import Comparison
-from brrt.replay.diff import Difference, first_difference
-from brrt.replay.explain import Explanation, explain
+from brrt.planners.base.problem import Problem
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics
-from brrt.replay.moment import Moment
+from brrt.replay.snapshot import Snapshot
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
-from brrt.run import Run, Sink
-from brrt.scenario import Scenario
+from brrt.runs.branched import BranchedRun, RepeatedRun
+from brrt.runs.reproduce import Again, plan_again
+from brrt.runs.run import Run, Sink
+from brrt.scenario.manifest import Manifest
+from brrt.scenario.scenario import Scenario
 from brrt.testing.gate import Verdict, gate
+from brrt.verification import Finding, check
 from brrt.worlds import GENERATORS, Grid, World, make_world
 
 __all__ = [
@@ -53,7 +53,6 @@ __all__ = [
     "McapSink",
     "Memory",
     "Metrics",
-    "Moment",
     "Planner",
     "Point",
     "Polygon",
@@ -65,6 +64,7 @@ __all__ = [
     "Run",
     "Scenario",
     "Sink",
+    "Snapshot",
     "Tree",
     "Verdict",
     "World",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from .console import note
 
 if TYPE_CHECKING:
-    from brrt.run import Run
+    from brrt.runs.run import Run
 
 
 def check_parent(parent: Path, scenario: Path | None, *outputs: Path | None) -> None:
@@ -41,10 +41,10 @@ def go_on(
     Raises:
         BrrtError: There is nothing to go on from, or a setting is of no use.
     """
-    from brrt.again import BranchedRun  # noqa: PLC0415
-    from brrt.branch import last_whole_iteration  # noqa: PLC0415
     from brrt.errors import RecordingError  # noqa: PLC0415
-    from brrt.recording import BrokenError, read  # noqa: PLC0415
+    from brrt.formats import BrokenError, read  # noqa: PLC0415
+    from brrt.runs.branch import last_whole_iteration  # noqa: PLC0415
+    from brrt.runs.branched import BranchedRun  # noqa: PLC0415
 
     seed = given.pop("seed", None)
     try:

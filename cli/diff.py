@@ -9,7 +9,7 @@ from .console import Code, print_json, print_lines
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.recording import Recording
+    from brrt.formats import Recording
 
 
 def diff(
@@ -31,7 +31,7 @@ def diff(
 
     brrt diff run.mcap run.rrd --json
     """
-    from brrt.recording.versus import compare  # noqa: PLC0415
+    from brrt.comparison.versus import compare  # noqa: PLC0415
 
     runs = (_saved(opened(run, partial=partial), partial=partial) for run in (a, b))
     found = compare(*runs, names=(str(a), str(b)))

@@ -46,7 +46,7 @@ def export(
     with Watch(None, "reading the recording").running() as watch:
         batches = Saved(recording, partial=partial, verb="export them")
         events = Events.concat(recording.manifest.dof, batches)
-        from brrt.recording import foxglove as viewers  # noqa: PLC0415 - costs half a second
+        from brrt.views import foxglove as viewers  # noqa: PLC0415 - costs half a second
 
         watch.total = 1.0
         count = viewers.export(

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 from .console import print_json, print_pairs, seconds
 
 if TYPE_CHECKING:
-    from brrt.replay.cells import CellHistory
-    from brrt.replay.moment import Moment
-    from brrt.replay.story import NodeHistory, When
+    from brrt.replay.cell_history import CellHistory
+    from brrt.replay.history_records import NodeHistory, When
+    from brrt.replay.snapshot import Snapshot
 
 _SHOWN = 5
 """Events of a kind that are listed; of more, the first and the last."""
@@ -33,13 +33,13 @@ def tree_number(tree: str | None) -> int:
     return _TREES[tree] if tree in _TREES else int(tree)
 
 
-def show_node(moment: "Moment", node: int, tree: int, *, as_json: bool) -> None:
+def show_node(moment: "Snapshot", node: int, tree: int, *, as_json: bool) -> None:
     """Print a node's history up to an instant, or a cell's.
 
     Raises:
         BrrtError: There was no such node.
     """
-    from brrt.replay.story import NodeHistory  # noqa: PLC0415
+    from brrt.replay.history_records import NodeHistory  # noqa: PLC0415
 
     found = moment.node(node, tree)
     if as_json:
@@ -50,7 +50,7 @@ def show_node(moment: "Moment", node: int, tree: int, *, as_json: bool) -> None:
 
 
 def _of_node(h: "NodeHistory") -> Rows:
-    from brrt.replay.history import tree_name  # noqa: PLC0415
+    from brrt.replay.node_history import tree_name  # noqa: PLC0415
 
     yield "node", f"{h.node:,} of tree {h.tree} ({tree_name(h.tree)}) at {_place(h.q)}"
     parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"

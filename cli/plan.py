@@ -16,8 +16,8 @@ from .numbers import whole_number
 
 if TYPE_CHECKING:
     from brrt.replay.metrics import Metrics
-    from brrt.run import Run, Sink
-    from brrt.scenario import Scenario
+    from brrt.runs.run import Run, Sink
+    from brrt.scenario.scenario import Scenario
 
 
 def plan(
@@ -177,8 +177,8 @@ def plan(
     brrt plan --from run.mcap --at-iteration 100 --param step=2
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.planners.stop import stop_on_signals  # noqa: PLC0415
-    from brrt.run import Run  # noqa: PLC0415
+    from brrt.planners.base.stop import stop_on_signals  # noqa: PLC0415
+    from brrt.runs.run import Run  # noqa: PLC0415
 
     from .outputs import check_display, check_output  # noqa: PLC0415
 
@@ -232,7 +232,7 @@ def plan(
 
 def _merged(file: Path | None, given: dict[str, Any], params: list[str]) -> "Scenario":
     """Put what was given on the command line on top of the file, if there is one."""
-    from brrt.scenario import Scenario  # noqa: PLC0415
+    from brrt.scenario.scenario import Scenario  # noqa: PLC0415
 
     base = Scenario() if file is None else Scenario.load(file)
     values = {**base.as_dict(), **given}
@@ -256,14 +256,14 @@ def _params(texts: list[str]) -> dict[str, str]:
 
 
 def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> list["Sink"]:
-    from brrt.recording import McapSink  # noqa: PLC0415
-    from brrt.recording.background import Background  # noqa: PLC0415
+    from brrt.formats import McapSink  # noqa: PLC0415
+    from brrt.formats.background import Background  # noqa: PLC0415
 
     world, sinks = run.problem.world, list["Sink"]()
     if mcap is not None:
         sinks.append(Background(McapSink(mcap, run.manifest, world)))
     if rrd is not None or view:
-        from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
+        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
 
         sinks.append(Background(RerunSink(run.manifest, world, path=rrd, view=view)))
     return sinks

@@ -11,7 +11,7 @@ from .instants import At, AtEvent, AtIteration, beyond, instant
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.pictures.history import Record
+    from brrt.views.matplotlib.history import Record
 
 PICTURES, ANIMATIONS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
 _VERB = "draw them"
@@ -119,9 +119,9 @@ def plot(
         raise BrrtError(f"--out {picture}: an animation shows the tree of one run")
     limits = instant(at, at_event, at_iteration)
 
-    from brrt.pictures.animation import DPI, Pace, need_ffmpeg, save_animation  # noqa: PLC0415
-    from brrt.pictures.figure import Look, save_plot  # noqa: PLC0415
-    from brrt.worlds.picture import need_matplotlib  # noqa: PLC0415
+    from brrt.views.matplotlib.animation import DPI, Pace, need_ffmpeg, save_animation  # noqa: PLC0415
+    from brrt.views.matplotlib.draw_world import need_matplotlib  # noqa: PLC0415
+    from brrt.views.matplotlib.figure import Look, save_plot  # noqa: PLC0415
 
     need_matplotlib()
     if picture.suffix == ".mp4":
@@ -148,7 +148,7 @@ def plot(
 
 def _panels(what: str | None) -> list[str]:
     from brrt.errors import unknown  # noqa: PLC0415
-    from brrt.pictures.figure import PANELS  # noqa: PLC0415
+    from brrt.views.matplotlib.figure import PANELS  # noqa: PLC0415
 
     if what is None:
         return []
@@ -164,9 +164,9 @@ def _panels(what: str | None) -> list[str]:
 def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "list[Record]":
     """Read the runs, up to the instant asked for; those of one name are told apart by folder."""
     from brrt.events import Events  # noqa: PLC0415
-    from brrt.pictures.history import Record  # noqa: PLC0415
-    from brrt.recording import Memory  # noqa: PLC0415
-    from brrt.replay.moment import feed  # noqa: PLC0415
+    from brrt.formats import Memory  # noqa: PLC0415
+    from brrt.replay.snapshot import feed  # noqa: PLC0415
+    from brrt.views.matplotlib.history import Record  # noqa: PLC0415
 
     names = Counter(run.stem for run in runs)
     records = []

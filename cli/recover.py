@@ -31,7 +31,7 @@ def recover(
 
     brrt recover cut.mcap --out whole.rrd
     """
-    from brrt.recording.recover import recover  # noqa: PLC0415 - keep --help fast
+    from brrt.formats.recover import recover  # noqa: PLC0415 - keep --help fast
 
     from .outputs import check_output  # noqa: PLC0415
 

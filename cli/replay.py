@@ -12,10 +12,10 @@ from .node import show_node, tree_number
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
+    from brrt.comparison.events import Difference
     from brrt.events import Instant
-    from brrt.recording import Recording
-    from brrt.replay.diff import Difference
-    from brrt.replay.growth import TreeFigures
+    from brrt.formats import Recording
+    from brrt.replay.tree_stats import TreeFigures
 
 _VERB = "replay them"
 _FEW = 3
@@ -79,12 +79,12 @@ def replay(
 
     brrt replay run.mcap --node 80 --at-iteration 400
     """
-    from brrt.replay.account import Account  # noqa: PLC0415
-    from brrt.replay.diff import Newest  # noqa: PLC0415
-    from brrt.replay.growth import Growth  # noqa: PLC0415
+    from brrt.comparison.event_text import event_lines  # noqa: PLC0415
+    from brrt.comparison.events import Newest  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
-    from brrt.replay.moment import feed  # noqa: PLC0415
-    from brrt.replay.parting import event_lines  # noqa: PLC0415
+    from brrt.replay.snapshot import feed  # noqa: PLC0415
+    from brrt.replay.transcript import Transcript  # noqa: PLC0415
+    from brrt.replay.tree_stats import TreeStats  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
@@ -101,9 +101,9 @@ def replay(
         _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
         return
     metrics = Metrics(recording.manifest)
-    trees = Growth()
+    trees = TreeStats()
     newest = [] if at_event is None else [Newest()]
-    told = Account(recording.manifest, recording.robot()) if text else None
+    told = Transcript(recording.manifest, recording.robot()) if text else None
     folds: list[Any] = [told] if told else [] if as_json else [trees, *newest]
     end = feed(Saved(recording, partial=partial, verb=_VERB), [metrics, *folds], limits)
     if end is not None:
@@ -152,8 +152,8 @@ def _note_end(limits: dict[str, int], count: int, last: "Instant") -> None:
 
 
 def _draw(recording: "Recording", rrd: Path, limits: dict[str, int], *, partial: bool) -> None:
-    from brrt.recording.rerun import RerunSink  # noqa: PLC0415 - costs half a second
-    from brrt.replay.moment import feed  # noqa: PLC0415
+    from brrt.replay.snapshot import feed  # noqa: PLC0415
+    from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
 
     sink = RerunSink(recording.manifest, recording.world, path=rrd)
     try:
@@ -171,10 +171,10 @@ def _tell_of(
     partial: bool,
     as_json: bool,
 ) -> None:
-    from brrt.replay.moment import Moment  # noqa: PLC0415
+    from brrt.replay.snapshot import Snapshot  # noqa: PLC0415
 
     batches = Counted(Saved(recording, partial=partial, verb=_VERB))
-    moment = Moment(recording.manifest, recording.world, lambda: iter(batches), limits)
+    moment = Snapshot(recording.manifest, recording.world, lambda: iter(batches), limits)
     show_node(moment, node, tree, as_json=as_json)
     _note_end(limits, batches.count, batches.last)
 
@@ -182,7 +182,7 @@ def _tell_of(
 def _difference(
     recording: "Recording", golden: "Recording", *, partial: bool
 ) -> "Difference | None":
-    from brrt.replay.diff import first_difference  # noqa: PLC0415
+    from brrt.comparison.events import first_difference  # noqa: PLC0415
 
     return first_difference(
         Saved(recording, partial=partial, verb=_VERB),
@@ -198,7 +198,7 @@ def _verdict(
     """Say whether a run is what another one was, and if not, where they part."""
     from dataclasses import replace  # noqa: PLC0415
 
-    from brrt.replay.parting import parting  # noqa: PLC0415
+    from brrt.comparison.event_text import parting  # noqa: PLC0415
 
     a, b = (
         f"{name} (seed {each.manifest.scenario.seed})"

@@ -11,7 +11,7 @@ from .console import counted, note
 
 if TYPE_CHECKING:
     from brrt.events import Events
-    from brrt.recording import Recording
+    from brrt.formats import Recording
 
 
 def naming_runs(command: Callable[..., None]) -> Callable[..., None]:
@@ -33,7 +33,7 @@ def naming_runs(command: Callable[..., None]) -> Callable[..., None]:
 
 def opened(run: Path, *, partial: bool) -> "Recording":
     """Open a recording; one that is not whole, and taken in part, lacks its run's end."""
-    from brrt.recording import read  # noqa: PLC0415 - keep --help fast
+    from brrt.formats import read  # noqa: PLC0415 - keep --help fast
 
     recording = read(run)
     if not partial:
@@ -57,7 +57,7 @@ class Saved:
 
     def __iter__(self) -> "Iterator[Events]":
         from brrt.errors import RecordingError  # noqa: PLC0415 - keep --help fast
-        from brrt.recording import BrokenError  # noqa: PLC0415
+        from brrt.formats import BrokenError  # noqa: PLC0415
 
         self.events, last = 0, 0
         try:

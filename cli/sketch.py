@@ -59,7 +59,7 @@ def _panel(
     world: "World", axes: tuple[int, int], columns: int, rows: int, *, blocks: bool
 ) -> list[Text]:
     """Draw a world in a frame, along the other axis if there is one."""
-    from brrt.colours import GOAL, START  # noqa: PLC0415 - keep --help fast
+    from brrt.views.colours import GOAL, START  # noqa: PLC0415 - keep --help fast
 
     size = (world.upper - world.lower)[list(axes)]
     # A character is about twice as high as wide: it holds two pixels, one above the other.

@@ -11,9 +11,9 @@ from .console import Code, Watch, note, out, print_json, print_lines, tell_of_co
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.recording import Recording
-    from brrt.repeat import Again
-    from brrt.replay.checks import Tally
+    from brrt.formats import Recording
+    from brrt.runs.reproduce import Again
+    from brrt.verification import RuleResult
 
 _SHOWN = 3
 _WIDTH = 80
@@ -65,7 +65,7 @@ def verify(
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
     from brrt.planners import PLANNERS  # noqa: PLC0415
-    from brrt.replay.checks import examine  # noqa: PLC0415
+    from brrt.verification import examine  # noqa: PLC0415
 
     if tolerance is not None and (not rerun or not tolerance >= 0):
         raise BrrtError("--tolerance must be a number from 0 on, and goes with --rerun alone")
@@ -73,12 +73,12 @@ def verify(
     planner = recording.manifest.scenario.planner
     saved = Saved(recording, partial=partial, verb="verify them")
     # A file that brrt recover made breaks off too, though it is whole.
-    tallies = examine(
+    results = examine(
         recording.manifest, recording.world, saved,
         cut=lambda: saved.cut or recording.result is None, figures=recording.result,
     )  # fmt: skip
     cut, events = saved.cut or recording.result is None, saved.events
-    broken = sum(tally.broken for tally in tallies)
+    broken = sum(result.broken for result in results)
     again = _again(recording, saved, tolerance) if rerun else None
     if as_json:
         known = planner in PLANNERS
@@ -88,7 +88,7 @@ def verify(
                 "planner_known": known,
                 "cut": cut,
                 "events": events,
-                "rules": _json(run, tallies),
+                "rules": _json(run, results),
                 **({} if again is None else {"rerun": again.as_dict()}),
             }
         )
@@ -97,7 +97,7 @@ def verify(
             note(f"{run} breaks off; what is promised of a run's end was left out")
         if planner not in PLANNERS:
             note(f"planner {planner} is not known here; its special promises were not checked")
-        _show(run, tallies, long=long)
+        _show(run, results, long=long)
         if again is not None:
             _show_again(again)
     if broken or (again is not None and not again.equal):
@@ -106,7 +106,7 @@ def verify(
 
 def _again(recording: "Recording", saved: Saved, tolerance: float | None) -> "Again":
     """Plan the run again, with a progress bar."""
-    from brrt.repeat import TOLERANCE, plan_again  # noqa: PLC0415
+    from brrt.runs.reproduce import TOLERANCE, plan_again  # noqa: PLC0415
 
     def watch(done: int, total: int) -> None:
         bar.total = total
@@ -137,13 +137,13 @@ def _look(run: Path, seq: int) -> str:
     return shlex.join(["brrt", "view", str(run), *at])
 
 
-def _json(run: Path, tallies: "list[Tally]") -> list[dict[str, Any]]:
+def _json(run: Path, results: "list[RuleResult]") -> list[dict[str, Any]]:
     return [
         {
-            "rule": tally.rule,
-            "promise": tally.promise,
-            "examined": tally.examined,
-            "broken": tally.broken,
+            "rule": result.rule,
+            "promise": result.promise,
+            "examined": result.examined,
+            "broken": result.broken,
             "findings": [
                 {
                     "seq": found.seq,
@@ -151,35 +151,35 @@ def _json(run: Path, tallies: "list[Tally]") -> list[dict[str, Any]]:
                     "message": found.message,
                     "view": _look(run, found.seq),
                 }
-                for found in tally.findings
+                for found in result.findings
             ],
         }
-        for tally in tallies
+        for result in results
     ]
 
 
-def _show(run: Path, tallies: "list[Tally]", *, long: bool) -> None:
+def _show(run: Path, results: "list[RuleResult]", *, long: bool) -> None:
     """Print a line a rule that had anything to look at, broken ones first with what they found."""
-    looked = sorted((t for t in tallies if t.examined), key=lambda tally: not tally.broken)
-    name = max((len(tally.rule) for tally in looked), default=0)
-    count = max((len(f"{tally.examined:,}") for tally in looked), default=0)
-    for tally in looked:
-        times = "once" if tally.broken == 1 else f"{tally.broken:,} times"
-        verdict = f"BROKEN {times}" if tally.broken else "holds"
-        line = f"{tally.rule:{name}}  {tally.examined:>{count},}  {verdict:6}"
-        promise = "" if long or tally.broken else _short(tally.promise, _WIDTH - len(line) - 2)
-        out.print(f"{line}  {promise}".rstrip(), style=_style(tally), markup=False, soft_wrap=True)
-        if long or tally.broken:
-            _tell(tally.promise, style="dim")
-        for found in tally.findings[:_SHOWN]:
+    looked = sorted((t for t in results if t.examined), key=lambda result: not result.broken)
+    name = max((len(result.rule) for result in looked), default=0)
+    count = max((len(f"{result.examined:,}") for result in looked), default=0)
+    for result in looked:
+        times = "once" if result.broken == 1 else f"{result.broken:,} times"
+        verdict = f"BROKEN {times}" if result.broken else "holds"
+        line = f"{result.rule:{name}}  {result.examined:>{count},}  {verdict:6}"
+        promise = "" if long or result.broken else _short(result.promise, _WIDTH - len(line) - 2)
+        out.print(f"{line}  {promise}".rstrip(), style=_style(result), markup=False, soft_wrap=True)
+        if long or result.broken:
+            _tell(result.promise, style="dim")
+        for found in result.findings[:_SHOWN]:
             where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
             _tell(f"{where}: {found.message}")
-        if tally.broken > _SHOWN:
-            out.print(f"  ... and {tally.broken - _SHOWN:,} more")
-        if tally.findings:
-            first = _look(run, tally.findings[0].seq)
+        if result.broken > _SHOWN:
+            out.print(f"  ... and {result.broken - _SHOWN:,} more")
+        if result.findings:
+            first = _look(run, result.findings[0].seq)
             out.print(f"  look: {first}", markup=False, soft_wrap=True)
-    broken = sum(bool(tally.broken) for tally in looked)
+    broken = sum(bool(result.broken) for result in looked)
     total = f"{len(looked)} rules, {broken} broken" if broken else f"all {len(looked)} rules hold"
     out.print(total, style="bold red" if broken else "bold green")
 
@@ -191,8 +191,8 @@ def _tell(text: str, style: str = "") -> None:
         out.print(line, style=style, markup=False, soft_wrap=True)
 
 
-def _style(tally: "Tally") -> str:
-    return "bold red" if tally.broken else ""
+def _style(result: "RuleResult") -> str:
+    return "bold red" if result.broken else ""
 
 
 def _short(promise: str, room: int) -> str:

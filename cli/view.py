@@ -14,8 +14,8 @@ from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.events import Events
-    from brrt.recording import Recording
-    from brrt.recording.drive import Cursor
+    from brrt.formats import Recording
+    from brrt.views.viewer.control import Cursor
 
 _TIMELINES = {"t": "t", "seq": "event", "iteration": "iteration"}
 _SMALLEST, _LARGEST = 200, 8192
@@ -81,7 +81,7 @@ def view(
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
-    from brrt.planners.stop import handling_signals  # noqa: PLC0415 - keep --help fast
+    from brrt.planners.base.stop import handling_signals  # noqa: PLC0415 - keep --help fast
 
     # Ended by a signal as by Ctrl-C, nothing that we started or wrote for a while outlives us.
     with tempfile.TemporaryDirectory(prefix="brrt-") as folder, handling_signals(_end):
@@ -90,13 +90,13 @@ def view(
         if web:
             _serve(file, runs, port)
             return
-        from brrt.recording import drive  # noqa: PLC0415 - costs half a second
+        from brrt.views.viewer import control  # noqa: PLC0415 - costs half a second
 
         with Watch(None, "waiting for the viewer").running():
             if screenshot is None:
-                drive.show(file, cursor, *marks)
+                control.show(file, cursor, *marks)
             else:
-                drive.screenshot(file, screenshot, cursor, pixels, *marks)
+                control.screenshot(file, screenshot, cursor, pixels, *marks)
         if screenshot is not None:
             out.print(f"{screenshot}: written", markup=False, soft_wrap=True)
 
@@ -159,7 +159,7 @@ def _prepare(
         cut = cut or saved.cut
     _check_instant(limits, logs)
 
-    from brrt.recording.drive import Cursor  # noqa: PLC0415 - costs half a second
+    from brrt.views.viewer.control import Cursor  # noqa: PLC0415 - costs half a second
 
     cursors = [Cursor(_TIMELINES[name], value) for name, value in limits.items()]
     cursor = cursors[0] if cursors else None
@@ -178,7 +178,7 @@ def _marks(
 ) -> list[Path]:
     """Draw a ring around the place of the event that is asked for, if one is."""
     from brrt.events import Events  # noqa: PLC0415
-    from brrt.recording.mark import draw_mark  # noqa: PLC0415
+    from brrt.views.rerun.marker import draw_mark  # noqa: PLC0415
 
     if "seq" not in limits:
         return []
@@ -203,7 +203,7 @@ def _check_instant(limits: dict[str, int], logs: "list[list[Events]]") -> None:
 
 def _draw(recording: "Recording", log: "list[Events]", file: Path, watch: Watch) -> None:
     """Draw a recording as `brrt replay --rrd` does."""
-    from brrt.recording.rerun import RerunSink  # noqa: PLC0415
+    from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415
 
     sink, done = RerunSink(recording.manifest, recording.world, path=file), 0
     watch.total = total = sum(map(len, log))
@@ -226,8 +226,8 @@ def _prepare_pair(
 ) -> "tuple[Path, Cursor | None]":
     """Draw two runs; where nothing else is asked for, they open where they part."""
     from brrt.events import Events  # noqa: PLC0415
-    from brrt.recording.drive import Cursor  # noqa: PLC0415
-    from brrt.recording.pair import Side, draw_pair  # noqa: PLC0415
+    from brrt.views.rerun.pair import Side, draw_pair  # noqa: PLC0415
+    from brrt.views.viewer.control import Cursor  # noqa: PLC0415
 
     watch.update(0, "drawing both runs", "")
     sides = [
@@ -249,7 +249,7 @@ def _prepare_pair(
 
 
 def _serve(file: Path, runs: list[Path], port: int | None) -> None:
-    from brrt.recording.web import Server  # noqa: PLC0415
+    from brrt.views.viewer.web import Server  # noqa: PLC0415
 
     server = Server(file, port)
     try:

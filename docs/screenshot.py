@@ -21,7 +21,7 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from tests.browser import CHROMIUM, browser  # noqa: E402 - it is no package that is installed
+from tests.support.browser import CHROMIUM, browser  # noqa: E402 - it is no package that is installed
 
 SIZE, WIDTH = (1600, 900), 1024
 """Of the viewer and of the pictures, in pixels: a few hundred kB would be too much to load."""

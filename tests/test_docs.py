@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from brrt.recording import drive
-from brrt.replay.checks import RULES
-
-from .conftest import Result
+from brrt.verification import RULES
+from brrt.views.viewer import control
+from tests.conftest import Result
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -32,7 +31,7 @@ def test_readme_commands_and_code(
     """Every brrt command and every Python block of the README runs, in its order."""
     windows = []
     monkeypatch.setenv("DISPLAY", ":nowhere")
-    monkeypatch.setattr(drive, "show", lambda run, _: windows.append(run))
+    monkeypatch.setattr(control, "show", lambda run, _: windows.append(run))
     (scenario,) = blocks("toml")
     Path("experiment.toml").write_text(scenario)
     commands = [

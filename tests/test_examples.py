@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 
 from brrt import Run, Scenario
-
-from .conftest import Result
+from tests.conftest import Result
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FILES = sorted(EXAMPLES.glob("*.toml"))

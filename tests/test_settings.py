@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from brrt.errors import BrrtError
 from brrt.planners import PLANNERS
-from brrt.planners.shortcut import Shortcut
+from brrt.planners.postprocessing.shortcut import Shortcut
 from brrt.settings import Settings, param
 from brrt.worlds import GENERATORS
 

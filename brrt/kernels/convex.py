@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.kernels.grid import Obstacles, bounding_boxes, build_obstacles
-from brrt.kernels.jit import borrowing, inlined
-from brrt.kernels.space import by_robot
+from brrt.kernels.broad_phase import Obstacles, bounding_boxes, build_obstacles
+from brrt.kernels.jit import helper, inline_helper
+from brrt.kernels.spaces.space import by_robot
 from brrt.worlds.convex import axes_of
 from brrt.worlds.world import World
 
@@ -194,7 +194,7 @@ def bound_moves(space: Any, A: Floats, i: int, B: Floats, j: int) -> None:
     space.bound_moves(space, A, i, B, j)
 
 
-@inlined
+@inline_helper
 def place_part(
     parts: Shapes, placed: Shapes, part: int, x: float, y: float, cos: float, sin: float
 ) -> None:
@@ -213,7 +213,7 @@ def place_part(
     placed.circles[part, 1] = y + (sin * px + cos * py)
 
 
-@inlined
+@inline_helper
 def _apart_along(one: Shapes, a: int, other: Shapes, b: int, best: float, enough: float) -> float:
     """Greatest separation of shape b along the axes of shape a, radii aside, or just `enough`."""
     for axis in range(one.first[a, 1], one.first[a + 1, 1]):
@@ -227,7 +227,7 @@ def _apart_along(one: Shapes, a: int, other: Shapes, b: int, best: float, enough
     return best
 
 
-@inlined
+@inline_helper
 def _apart_from_centre(one: Shapes, a: int, x: float, y: float) -> float:
     """Separation of a shape and a point along the direction of its nearest vertex."""
     nearest, nx, ny = np.inf, 0.0, 0.0
@@ -245,7 +245,7 @@ def _apart_from_centre(one: Shapes, a: int, x: float, y: float) -> float:
     return float(nx * x + ny * y - reach)
 
 
-@inlined
+@inline_helper
 def _separation(one: Shapes, a: int, other: Shapes, b: int, enough: float) -> float:
     """Lower bound of the distance of two shapes; exactness beyond `enough` is not sought."""
     radius, first = other.radii[b], other.first[b, 0]
@@ -258,7 +258,7 @@ def _separation(one: Shapes, a: int, other: Shapes, b: int, enough: float) -> fl
     return float(best - radius)
 
 
-@inlined
+@inline_helper
 def _may_meet(one: Shapes, a: int, other: Shapes, b: int, reach: float) -> bool:
     """Whether the circles around two shapes come closer than `reach`."""
     dx = one.circles[a, 0] - other.circles[b, 0]
@@ -267,7 +267,7 @@ def _may_meet(one: Shapes, a: int, other: Shapes, b: int, reach: float) -> bool:
     return bool(dx * dx + dy * dy <= far * far)
 
 
-@borrowing
+@helper
 def _decide(body: Body, scenery: Scenery, count: int, half: float) -> int:
     """Decide about the piece of a motion whose middle is placed and which is 2 `half` of it long.
 
@@ -313,12 +313,12 @@ def _decide(body: Body, scenery: Scenery, count: int, half: float) -> int:
     return result
 
 
-@inlined
+@inline_helper
 def _cell(offset: float, per_length: float, count: int) -> int:
     return int(max(min(offset * per_length, count - 1.0), 0.0))
 
 
-@borrowing
+@helper
 def _gather(body: Body, scenery: Scenery) -> int:
     """List the obstacles that the placed body may meet in the whole motion; return how many."""
     placed = body.placed
@@ -354,7 +354,7 @@ def _gather(body: Body, scenery: Scenery) -> int:
     return n
 
 
-@borrowing
+@helper
 def motion_free(space: Any, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the motion from A[i] to B[j] is free everywhere, ends included.
 

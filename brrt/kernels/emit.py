@@ -21,7 +21,7 @@ from brrt.events import (
     table_dtype,
 )
 from brrt.kernels.clock import COMPILED_CLOCK, now_ns
-from brrt.kernels.jit import inlined
+from brrt.kernels.jit import inline_helper
 
 INTS = 3
 """Integer fields that a kind may have; `emit` takes this many."""
@@ -58,13 +58,13 @@ class Buffer(NamedTuple):
     points: NDArray[np.float64]
 
 
-@inlined
+@inline_helper
 def room(buffer: Buffer) -> int:
     """Events that still fit."""
     return len(buffer.kind) - int(buffer.state[_COUNT])
 
 
-@inlined
+@inline_helper
 def emit(
     buffer: Buffer,
     kind: int,
@@ -109,13 +109,13 @@ def emit(
     state[_COUNT] = n + 1
 
 
-@inlined
+@inline_helper
 def point_room(buffer: Buffer) -> int:
     """Waypoints that still fit."""
     return len(buffer.points) - int(buffer.state[_POINTS])
 
 
-@inlined
+@inline_helper
 def take_points(buffer: Buffer, n: int) -> int:
     """Reserve n rows of `points`, which the caller saw to be there; return the first."""
     first = int(buffer.state[_POINTS])
@@ -123,7 +123,7 @@ def take_points(buffer: Buffer, n: int) -> int:
     return first
 
 
-@inlined
+@inline_helper
 def emit_end(buffer: Buffer, iteration: int, status: int) -> None:
     """Say how planning has ended, a `Status`; the caller saw to it that there is room."""
     emit(buffer, _PHASE, iteration, _PLAN, status, 0, 0.0, buffer.q, 0)

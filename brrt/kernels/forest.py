@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind
 from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
-from brrt.kernels.jit import inlined
+from brrt.kernels.jit import inline_helper
 from brrt.kernels.kdtree import KdTree, grown_kdtree, has_room, insert, rooted_kdtree
-from brrt.kernels.space import distance
+from brrt.kernels.spaces.space import distance
 
 Floats = NDArray[np.float64]
 
@@ -76,13 +76,13 @@ def grown(column: NDArray[Any], n: int, capacity: int) -> NDArray[Any]:
     return larger
 
 
-@inlined
+@inline_helper
 def fits(forest: Forest, nodes: int) -> bool:
     """Whether so many more nodes fit, and one of them among the neighbours."""
     return int(forest.nodes[0]) + nodes <= len(forest.parent) and has_room(forest.neighbours)
 
 
-@inlined
+@inline_helper
 def add(
     forest: Forest, space: Any, log: Buffer, iteration: int, tree: int, parent: int, Q: Floats,
     row: int,
@@ -102,14 +102,14 @@ def add(
     return node
 
 
-@inlined
+@inline_helper
 def emit_roots(forest: Forest, log: Buffer) -> None:
     """Say where the trees begin."""
     for root in range(len(forest.nodes) - 1):
         emit(log, _EDGE, 0, root, 0, -1, 0.0, forest.q, root)
 
 
-@inlined
+@inline_helper
 def _depth(forest: Forest, node: int) -> int:
     """Nodes from a root to `node`, both included; 0 for no node."""
     depth = 0
@@ -119,7 +119,7 @@ def _depth(forest: Forest, node: int) -> int:
     return depth
 
 
-@inlined
+@inline_helper
 def emit_path(
     forest: Forest, log: Buffer, iteration: int, stage: int, cost: float, start: int, goal: int
 ) -> int:

@@ -30,7 +30,7 @@ def _sources_digest() -> str:
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
     for name in _SOURCES:
         place = _PACKAGE / name
-        for file in sorted(place.glob("*.py")) if place.is_dir() else [place]:
+        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
             digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -92,13 +92,13 @@ def prepared(fn: F, *args: Any) -> F:
     return cast("F", dispatcher.overloads[signature].entry_point)
 
 
-def inlined(fn: F) -> F:
+def inline_helper(fn: F) -> F:
     """Compile `fn` as `kernel` does, into every kernel that calls it; Python cannot call it."""
     return _compiled(fn, INLINED)
 
 
-def borrowing(fn: F) -> F:
-    """Compile `fn` as `inlined` does, but only once: for what is long or seldom called."""
+def helper(fn: F) -> F:
+    """Compile `fn` as `inline_helper` does, but only once: for what is long or seldom called."""
     return _compiled(fn, BORROWING)
 
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.kernels.jit import borrowing, inlined
-from brrt.kernels.space import box_measure, length, measure
+from brrt.kernels.jit import helper, inline_helper
+from brrt.kernels.spaces.space import box_measure, length, measure
 
 Floats = NDArray[np.float64]
 
@@ -115,19 +115,19 @@ def _empty_kdtree(d: int, capacity: int) -> KdTree:
     )
 
 
-@inlined
+@inline_helper
 def _buckets_left(tree: KdTree) -> int:
     counts = tree.counts
     return len(tree.free_buckets) - int(counts[_BUCKETS] - counts[_FREE_BUCKETS])
 
 
-@inlined
+@inline_helper
 def has_room(tree: KdTree) -> bool:
     """Whether another node fits, even if it splits a bucket."""
     return _buckets_left(tree) >= _REBUILD_NEEDS and int(tree.counts[_NODES]) < len(tree.gathered)
 
 
-@inlined
+@inline_helper
 def _new_cell(tree: KdTree) -> int:
     if tree.counts[_FREE_CELLS] > 0:
         tree.counts[_FREE_CELLS] -= 1
@@ -136,7 +136,7 @@ def _new_cell(tree: KdTree) -> int:
     return int(tree.counts[_CELLS] - 1)
 
 
-@inlined
+@inline_helper
 def _new_bucket(tree: KdTree) -> int:
     if tree.counts[_FREE_BUCKETS] > 0:
         tree.counts[_FREE_BUCKETS] -= 1
@@ -145,7 +145,7 @@ def _new_bucket(tree: KdTree) -> int:
     return int(tree.counts[_BUCKETS] - 1)
 
 
-@inlined
+@inline_helper
 def _stretch(tree: KdTree, cell: int, q: Floats, node: int, d: int) -> None:
     """Let a cell's box reach a node."""
     for k in range(d):
@@ -153,7 +153,7 @@ def _stretch(tree: KdTree, cell: int, q: Floats, node: int, d: int) -> None:
         tree.boxes[cell, d + k] = max(tree.boxes[cell, d + k], q[node, k])
 
 
-@inlined
+@inline_helper
 def _open_leaf(tree: KdTree, cell: int, bucket: int, d: int) -> None:
     tree.cells[cell, _AXIS], tree.cells[cell, _SIZE] = _LEAF, 0
     tree.cells[cell, _LEFT], tree.cells[cell, _RIGHT] = bucket, -1
@@ -161,7 +161,7 @@ def _open_leaf(tree: KdTree, cell: int, bucket: int, d: int) -> None:
         tree.boxes[cell, k], tree.boxes[cell, d + k] = np.inf, -np.inf
 
 
-@inlined
+@inline_helper
 def _put(tree: KdTree, cell: int, node: int, q: Floats, row: int, d: int) -> None:
     """Add a node that stands at q[row] to a leaf that has room."""
     at = tree.cells[cell, _LEFT] * BUCKET + tree.cells[cell, _SIZE]
@@ -172,7 +172,7 @@ def _put(tree: KdTree, cell: int, node: int, q: Floats, row: int, d: int) -> Non
     tree.cells[cell, _SIZE] += 1
 
 
-@inlined
+@inline_helper
 def _widest_axis(tree: KdTree, cell: int, d: int) -> int:
     """Return the longest side of a cell's box; -1 where all its nodes coincide."""
     axis, widest = -1, 0.0
@@ -182,7 +182,7 @@ def _widest_axis(tree: KdTree, cell: int, d: int) -> int:
     return axis
 
 
-@inlined
+@inline_helper
 def _gather(tree: KdTree, root: int) -> int:
     """List the nodes below a cell, give back all cells and buckets but itself; return how many."""
     n, top = 0, 1
@@ -206,7 +206,7 @@ def _gather(tree: KdTree, root: int) -> int:
     return n
 
 
-@inlined
+@inline_helper
 def _partition(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int, split: float) -> int:
     """Put the nodes below the split first; return where the others begin."""
     middle = lo
@@ -217,7 +217,7 @@ def _partition(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int, s
     return middle
 
 
-@inlined
+@inline_helper
 def _median(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int) -> float:
     """Coordinate of the middle one of the nodes ids[lo:hi] (quickselect, in place)."""
     middle = (lo + hi) // 2
@@ -243,7 +243,7 @@ def _median(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int) -> f
     return float(q[ids[middle], axis])
 
 
-@borrowing
+@helper
 def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
     """Build a cell anew, halving at the median of its longest side down to the buckets."""
     if _buckets_left(tree) < max(tree.cells[root, _SIZE] // 4, _REBUILD_NEEDS):
@@ -280,13 +280,13 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
         top += 2
 
 
-@inlined
+@inline_helper
 def _side(tree: KdTree, cell: int, x: float, d: int) -> int:
     """Return the child that holds a coordinate along the splitting axis."""
     return int(tree.cells[cell, _RIGHT if x >= tree.boxes[cell, 2 * d] else _LEFT])
 
 
-@borrowing
+@helper
 def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
     """Share a full leaf's nodes between two new leaves, at the mean of its longest side."""
     bucket, other = tree.cells[cell, _LEFT], _new_bucket(tree)
@@ -309,7 +309,7 @@ def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
     tree.built[cell] = BUCKET
 
 
-@inlined
+@inline_helper
 def insert(tree: KdTree, space: Any, q: Floats, node: int, root: int) -> None:
     """Add a node that stands at q[node] to a tree; the caller saw to it that it `has_room`.
 
@@ -345,7 +345,7 @@ def insert(tree: KdTree, space: Any, q: Floats, node: int, root: int) -> None:
         _rebuild(tree, q, lopsided, d)
 
 
-@inlined
+@inline_helper
 def nearest(tree: KdTree, space: Any, Q: Floats, row: int, root: int) -> int:
     """Return a tree's node nearest to Q[row] in the robot's metric.
 
@@ -374,7 +374,7 @@ def nearest(tree: KdTree, space: Any, Q: Floats, row: int, root: int) -> int:
                 break
 
 
-@inlined
+@inline_helper
 def near(
     tree: KdTree,
     space: Any,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind, Reason, Stage
 from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
-from brrt.kernels.jit import borrowing, inlined
-from brrt.kernels.space import distance, segment_free
+from brrt.kernels.jit import helper, inline_helper
+from brrt.kernels.spaces.space import distance, segment_free
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -197,20 +197,20 @@ def _doubled(columns: Columns, names: tuple[str, ...]) -> Columns:
     return columns._replace(**larger)
 
 
-@inlined
+@inline_helper
 def lattice_has_room(lattice: Lattice) -> bool:
     """Whether all neighbours of a cell fit."""
     return int(lattice.counts[CELLS]) + len(lattice.deltas) < len(lattice.keys)
 
 
-@inlined
+@inline_helper
 def search_has_room(search: Search, lattice: Lattice) -> bool:
     """Whether all neighbours of a cell can be opened."""
     enough = int(search.counts[HEAPED]) + len(lattice.deltas) <= len(search.heap_cell)
     return enough and len(search.mark) == len(lattice.keys)
 
 
-@inlined
+@inline_helper
 def _place(lattice: Lattice, key: int) -> int:
     """Find the slot of a key: where its cell stands, or the free one where it belongs."""
     slots, keys = lattice.slots, lattice.keys
@@ -221,7 +221,7 @@ def _place(lattice: Lattice, key: int) -> int:
     return place
 
 
-@borrowing
+@helper
 def enter_cells(lattice: Lattice) -> None:
     """Enter into the hash table what is not in it yet: the start, or all after it grew."""
     counts = lattice.counts
@@ -231,7 +231,7 @@ def enter_cells(lattice: Lattice) -> None:
         counts[HASHED] = cell + 1
 
 
-@borrowing
+@helper
 def look(lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int) -> None:
     """See whether the goal can be reached from a cell; if not, find its neighbours.
 
@@ -280,7 +280,7 @@ def look(lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int) -
     counts[EXPANDED] += 1
 
 
-@inlined
+@inline_helper
 def exhausted(lattice: Lattice) -> bool:
     """Whether all that can be reached has been seen, and the goal from nowhere.
 
@@ -289,7 +289,7 @@ def exhausted(lattice: Lattice) -> bool:
     return bool(lattice.counts[EXPANDED] == lattice.counts[CELLS])
 
 
-@inlined
+@inline_helper
 def _before(f: float, h: float, cell: int, search: Search, at: int) -> bool:
     """Whether an entry goes before another: less f, then less h, then the lesser number."""
     if f != search.heap_f[at]:
@@ -299,12 +299,12 @@ def _before(f: float, h: float, cell: int, search: Search, at: int) -> bool:
     return bool(cell < search.heap_cell[at])
 
 
-@inlined
+@inline_helper
 def _put(search: Search, at: int, f: float, h: float, cell: int) -> None:
     search.heap_f[at], search.heap_h[at], search.heap_cell[at] = f, h, cell
 
 
-@inlined
+@inline_helper
 def push(search: Search, f: float, h: float, cell: int) -> None:
     """Enter a cell into the heap."""
     at = int(search.counts[HEAPED])
@@ -318,7 +318,7 @@ def push(search: Search, f: float, h: float, cell: int) -> None:
     _put(search, at, f, h, cell)
 
 
-@inlined
+@inline_helper
 def pop(search: Search) -> int:
     """Take the first cell from the heap."""
     top = int(search.heap_cell[0])
@@ -339,7 +339,7 @@ def pop(search: Search) -> int:
     return top
 
 
-@inlined
+@inline_helper
 def begin(search: Search, lattice: Lattice, root: int) -> None:
     """Begin a search at a cell."""
     search.counts[SEARCH] += 1
@@ -349,13 +349,13 @@ def begin(search: Search, lattice: Lattice, root: int) -> None:
     push(search, lattice.h[root], lattice.h[root], root)
 
 
-@inlined
+@inline_helper
 def is_closed(search: Search, cell: int) -> bool:
     """Whether this search expanded a cell."""
     return bool(search.mark[cell] == search.counts[SEARCH] * _MARKS + _CLOSED)
 
 
-@inlined
+@inline_helper
 def best_open(search: Search) -> int:
     """Return the cell to expand next, or -1 where there is none."""
     while search.counts[HEAPED] > 0:
@@ -365,7 +365,7 @@ def best_open(search: Search) -> int:
     return -1
 
 
-@inlined
+@inline_helper
 def expand(
     search: Search, lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int
 ) -> bool:
@@ -389,7 +389,7 @@ def expand(
     return False
 
 
-@inlined
+@inline_helper
 def emit_way(
     lattice: Lattice, log: Buffer, iteration: int, cells: Ints, n: int, cost: float
 ) -> int:

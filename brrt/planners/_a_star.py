@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Status
 from brrt.kernels.emit import Buffer, emit_end, room
-from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.lattice import (
     BLOCKED,
     Lattice,
@@ -21,7 +21,16 @@ from brrt.kernels.lattice import (
     search_has_room,
 )
 from brrt.kernels.random import Random
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, ENDED, LIMIT, OWN, POINTS, STATE_FULL
+from brrt.planners.base.kernel_planner import (
+    BATCH_FULL,
+    COUNTED,
+    DRAWS,
+    ENDED,
+    LIMIT,
+    OWN,
+    POINTS,
+    STATE_FULL,
+)
 
 SOLVED, NO_PATH = int(Status.SOLVED), int(Status.NO_PATH)
 
@@ -48,7 +57,7 @@ class Frontier(NamedTuple):
     counts: NDArray[np.int64]
 
 
-@inlined
+@inline_helper
 def say_path(frontier: Frontier, log: Buffer) -> int:
     """Say which way led to the newest cell, and on to the goal; see `emit_way`."""
     lattice, search, cell = frontier.lattice, frontier.search, int(frontier.counts[LAST])

@@ -13,11 +13,20 @@ from numpy.typing import NDArray
 from brrt.events import Kind, Reason, Source, Stage, Status
 from brrt.kernels.emit import Buffer, emit, emit_end, room
 from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
-from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.kdtree import nearest
 from brrt.kernels.random import Random, uniform
-from brrt.kernels.space import distance, sample_uniform, segment_free, steer
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, ENDED, LIMIT, OWN, POINTS, STATE_FULL
+from brrt.kernels.spaces.space import distance, sample_uniform, segment_free, steer
+from brrt.planners.base.kernel_planner import (
+    BATCH_FULL,
+    COUNTED,
+    DRAWS,
+    ENDED,
+    LIMIT,
+    OWN,
+    POINTS,
+    STATE_FULL,
+)
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +79,7 @@ class Trees(NamedTuple):
     scratch: Floats
 
 
-@inlined
+@inline_helper
 def draw(trees: Trees, space: Any, rng: Random, log: Buffer, options: Options) -> int:
     """Choose a tree and what it heads for; return the stage that begins."""
     counts, sizes = trees.counts, trees.forest.nodes
@@ -92,14 +101,14 @@ def draw(trees: Trees, space: Any, rng: Random, log: Buffer, options: Options) -
     return stage
 
 
-@inlined
+@inline_helper
 def aim_at_newest(trees: Trees, space: Any, tree: int) -> None:
     """Let the next extensions head for a tree's newest node."""
     for k in range(len(space.lower)):
         trees.scratch[_TARGET, k] = trees.forest.q[trees.counts[NEWEST + tree], k]
 
 
-@inlined
+@inline_helper
 def connect(trees: Trees, log: Buffer, tree: int, node: int, far: float) -> None:
     """Say that `node` of a tree has met the newest node of the other one."""
     forest, counts = trees.forest, trees.counts

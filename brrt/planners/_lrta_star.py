@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind, Status
 from brrt.kernels.emit import Buffer, emit, emit_end, room
-from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.lattice import (
     ARRIVES,
     BLOCKED,
@@ -30,7 +30,16 @@ from brrt.kernels.lattice import (
     search_has_room,
 )
 from brrt.kernels.random import Random
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, ENDED, LIMIT, OWN, POINTS, STATE_FULL
+from brrt.planners.base.kernel_planner import (
+    BATCH_FULL,
+    COUNTED,
+    DRAWS,
+    ENDED,
+    LIMIT,
+    OWN,
+    POINTS,
+    STATE_FULL,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -90,7 +99,7 @@ class Walk(NamedTuple):
     counts: NDArray[np.int64]
 
 
-@inlined
+@inline_helper
 def raise_estimate(walk: Walk, log: Buffer, cell: int, h: float) -> None:
     """Keep the new estimate of a cell's cost to the goal if it is greater."""
     lattice = walk.lattice
@@ -99,7 +108,7 @@ def raise_estimate(walk: Walk, log: Buffer, cell: int, h: float) -> None:
         emit(log, HEURISTIC, walk.counts[MOVES], cell, 0, 0, h, lattice.q, cell)
 
 
-@inlined
+@inline_helper
 def plan_arrival(walk: Walk, cell: int, end: int) -> None:
     """Let the plan end at the goal, which is in reach from its last cell or is there already."""
     if walk.lattice.h[cell] > 0.0:
@@ -108,7 +117,7 @@ def plan_arrival(walk: Walk, cell: int, end: int) -> None:
     walk.counts[END], walk.counts[LAST_LEG] = end, 1
 
 
-@inlined
+@inline_helper
 def step_ahead(walk: Walk, space: Any, log: Buffer) -> bool:
     """Look one cell ahead (Korf 1990): learn from the best neighbour and plan to go there.
 
@@ -137,7 +146,7 @@ def step_ahead(walk: Walk, space: Any, log: Buffer) -> bool:
     return True
 
 
-@inlined
+@inline_helper
 def plan_moves(walk: Walk, best: int, arrives: bool) -> None:
     """Plan to go where the search leads, and from there to the goal if it is in reach."""
     search, n, cell = walk.search, 0, best
@@ -153,7 +162,7 @@ def plan_moves(walk: Walk, best: int, arrives: bool) -> None:
         plan_arrival(walk, best, n)
 
 
-@inlined
+@inline_helper
 def learn(walk: Walk, log: Buffer) -> None:
     """Raise the estimates of the expanded cells to what those around them allow.
 
@@ -189,7 +198,7 @@ def learn(walk: Walk, log: Buffer) -> None:
         raise_estimate(walk, log, cell, learnt[cell])
 
 
-@inlined
+@inline_helper
 def go(walk: Walk, log: Buffer) -> None:
     """Make the next move of the plan."""
     lattice, counts = walk.lattice, walk.counts
@@ -217,7 +226,7 @@ def go(walk: Walk, log: Buffer) -> None:
     )  # fmt: skip
 
 
-@inlined
+@inline_helper
 def say_path(walk: Walk, log: Buffer) -> int:
     """Say which way the robot went in the trial that just ended; see `emit_way`."""
     counts = walk.counts
@@ -226,7 +235,7 @@ def say_path(walk: Walk, log: Buffer) -> int:
     )
 
 
-@inlined
+@inline_helper
 def return_to_start(walk: Walk) -> None:
     """Begin the next trial."""
     walk.counts[TRIAL] += 1

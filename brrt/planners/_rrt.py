@@ -8,11 +8,20 @@ from numpy.typing import NDArray
 from brrt.events import Kind, Reason, Source, Stage, Status
 from brrt.kernels.emit import Buffer, emit, emit_end, room
 from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
-from brrt.kernels.jit import inlined, kernel
+from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.kdtree import nearest
 from brrt.kernels.random import Random, uniform
-from brrt.kernels.space import distance, interpolate, sample_uniform, segment_free, steer
-from brrt.planners.drive import BATCH_FULL, COUNTED, DRAWS, ENDED, LIMIT, OWN, POINTS, STATE_FULL
+from brrt.kernels.spaces.space import distance, interpolate, sample_uniform, segment_free, steer
+from brrt.planners.base.kernel_planner import (
+    BATCH_FULL,
+    COUNTED,
+    DRAWS,
+    ENDED,
+    LIMIT,
+    OWN,
+    POINTS,
+    STATE_FULL,
+)
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +64,7 @@ class Tree(NamedTuple):
     scratch: Floats
 
 
-@inlined
+@inline_helper
 def extend(tree: Tree, space: Any, log: Buffer, near: int, options: Options) -> int:
     """Grow from `near` towards the sample by at most a step; return the new node, or -1."""
     scratch, draw = tree.scratch, tree.counts[DRAWS]
@@ -79,7 +88,7 @@ def extend(tree: Tree, space: Any, log: Buffer, near: int, options: Options) -> 
     return node
 
 
-@inlined
+@inline_helper
 def reach_goal(tree: Tree, space: Any, log: Buffer, node: int, options: Options) -> bool:
     """Try to join the goal to the newest node, as the goal test allows."""
     scratch, draw = tree.scratch, tree.counts[DRAWS]

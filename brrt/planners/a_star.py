@@ -14,11 +14,12 @@ from brrt.kernels.lattice import (
     grown_search,
     rooted_lattice,
 )
-from brrt.planners import _a_star, contract
-from brrt.planners.drive import Loop, LoopPlanner
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.planners import _a_star
+from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
 from brrt.robots import Point
+from brrt.scenario import contract
 from brrt.settings import param
 
 _FIRST_ROOM = 1 << 18
@@ -29,10 +30,10 @@ MOST_DRAWS = 1 << 62
 
 
 @dataclass(frozen=True, slots=True)
-class LatticePlanner(LoopPlanner):
+class LatticePlanner(KernelPlanner):
     """What the searches on a lattice have in common; its cells begin at the start."""
 
-    settled: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
+    fixed_params: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
 
     epsilon: float = param(0.5, "edge of a cell", above=0)
     diagonals: bool = param(False, "move to all cells around (26 in 3D), not across faces alone")
@@ -74,15 +75,15 @@ class AStar(LatticePlanner):
         grid = contract.Lattice(self.epsilon, self.diagonals, self.max_move, lookahead=None)
         return contract.Contract(lattice=grid)
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:  # noqa: ARG002
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
+        """See `KernelPlanner.loop`."""
         lattice = self._lattice(problem)
         frontier = _a_star.Frontier(
             lattice, empty_search(len(lattice.keys)), np.zeros(_a_star.COUNTS, np.int64)
         )
         frontier.counts[_a_star.LAST] = -1
         most = len(lattice.deltas) + 1
-        return Loop(_a_star.advance, frontier, _a_star.Options(), _grown, most, MOST_DRAWS)
+        return Kernel(_a_star.advance, frontier, _a_star.Options(), _grown, most, MOST_DRAWS)
 
 
 def _grown(frontier: _a_star.Frontier) -> _a_star.Frontier:

@@ -7,17 +7,17 @@ import numpy as np
 
 from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
 from brrt.planners import _bi_rrt
-from brrt.planners.contract import Contract, Draws, Growth
-from brrt.planners.drive import Loop, LoopPlanner
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
+from brrt.scenario.contract import Contract, Draws, Growth
 from brrt.settings import param
 
 _TURNS = {"alternate": _bi_rrt.ALTERNATE, "smaller": _bi_rrt.SMALLER, "coin": _bi_rrt.COIN}
 
 
 @dataclass(frozen=True, slots=True)
-class BiRRT(LoopPlanner):
+class BiRRT(KernelPlanner):
     """Bidirectional RRT (Kuffner and LaValle 2000): one tree from the start, one from the goal.
 
     In each iteration one tree grows towards a sample, and the other one then heads for the newest
@@ -55,8 +55,8 @@ class BiRRT(LoopPlanner):
         draws = Draws(coin=0.5 if self.turn == "coin" else 0.0)
         return Contract(step=step, link=step, draws=draws, growth=growth, stops=True)
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.loop`."""
         step = step_length(self.step, problem)
         options = _bi_rrt.Options(
             step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
@@ -70,15 +70,15 @@ def step_length(step: float | None, problem: Problem, part: float = 0.05) -> flo
     return step or part * problem.world.extent
 
 
-def loop_of(options: _bi_rrt.Options, problem: Problem, stop: Stop) -> Loop[_bi_rrt.Trees]:
-    """Make the loop of any variant; see `LoopPlanner.loop`."""
+def loop_of(options: _bi_rrt.Options, problem: Problem, stop: Stop) -> Kernel[_bi_rrt.Trees]:
+    """Make the loop of any variant; see `KernelPlanner.loop`."""
     roots = np.array([problem.start, problem.goal])
     counts = np.zeros(_bi_rrt.COUNTS, np.int64)
     counts[_bi_rrt.NEWEST + 1] = 1
     trees = _bi_rrt.Trees(
         rooted_forest(roots, RESERVED_NODES), counts, np.zeros(1), scratch=roots.copy()
     )
-    return Loop(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
+    return Kernel(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
 
 
 def _grown(trees: _bi_rrt.Trees) -> _bi_rrt.Trees:

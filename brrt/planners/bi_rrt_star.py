@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from brrt.planners import _star
-from brrt.planners.drive import Loop
+from brrt.planners import _rrt_star
+from brrt.planners.base.kernel_planner import Kernel
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
 from brrt.planners.rrt_star import StarPlanner, loop_of
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
 from brrt.settings import param
 
 
@@ -26,12 +26,12 @@ class BiRRTStar(StarPlanner):
         None, "longest link between the trees; the step by default", above=0
     )
 
-    def options(self, problem: Problem) -> _star.Options:
+    def options(self, problem: Problem) -> _rrt_star.Options:
         """See `StarPlanner.options`."""
         options = StarPlanner.options(self, problem)
         return options._replace(link=self.connect_distance or options.step)
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.loop`."""
         roots = np.array([problem.start, problem.goal])
         return loop_of(self.options(problem), roots, problem, stop)

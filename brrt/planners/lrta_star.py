@@ -6,11 +6,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from brrt.kernels.lattice import empty_search, grown_lattice, grown_search
-from brrt.planners import _lrta_star, contract
+from brrt.planners import _lrta_star
 from brrt.planners.a_star import MOST_DRAWS, LatticePlanner
-from brrt.planners.drive import UNCOUNTED, Loop
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.planners.base.kernel_planner import UNLIMITED, Kernel
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
+from brrt.scenario import contract
 from brrt.settings import param
 
 _MOST_AHEAD = 10_000
@@ -28,7 +29,7 @@ class LRTAStar(LatticePlanner):
     then to the one seen first; neighbours are looked at in the order +x, -x, +y, -y, +z, -z.
     """
 
-    onward: ClassVar[str] = "let it start over with what it learnt: --param trials=10"
+    resume_hint: ClassVar[str] = "let it start over with what it learnt: --param trials=10"
 
     lookahead: int = param(1, "cells to expand before a move", low=1, high=_MOST_AHEAD)
     trials: int = param(1, "times to start over with what was learnt", low=1)
@@ -40,17 +41,17 @@ class LRTAStar(LatticePlanner):
         )
         return contract.Contract(lattice=grid)
 
-    def retracing(self, problem: Problem) -> Loop[Any]:
-        """See `LoopPlanner.retracing`."""
-        loop = self.loop(problem, Stop(iterations=UNCOUNTED))
+    def retracing(self, problem: Problem) -> Kernel[Any]:
+        """See `KernelPlanner.retracing`."""
+        loop = self.loop(problem, Stop(iterations=UNLIMITED))
         return replace(loop, options=loop.options._replace(retraces=True))
 
     def ends_where(self, other: Self) -> bool:
-        """See `LoopPlanner.ends_where`."""
+        """See `KernelPlanner.ends_where`."""
         return self.trials <= other.trials
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:  # noqa: ARG002
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
+        """See `KernelPlanner.loop`."""
         lattice = self._lattice(problem)
         walk = _lrta_star.Walk(
             lattice=lattice,
@@ -64,7 +65,7 @@ class LRTAStar(LatticePlanner):
         )
         options = _lrta_star.Options(self.lookahead, self.trials, retraces=False)
         most = max(len(lattice.deltas), self.lookahead) + 4
-        return Loop(_lrta_star.advance, walk, options, _grown, most, MOST_DRAWS)
+        return Kernel(_lrta_star.advance, walk, options, _grown, most, MOST_DRAWS)
 
 
 def _grown(walk: _lrta_star.Walk) -> _lrta_star.Walk:

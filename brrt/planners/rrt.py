@@ -7,10 +7,10 @@ import numpy as np
 
 from brrt.kernels.forest import grown_forest, rooted_forest
 from brrt.planners import _rrt
-from brrt.planners.contract import Contract, Draws, Growth
-from brrt.planners.drive import Loop, LoopPlanner
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
+from brrt.scenario.contract import Contract, Draws, Growth
 from brrt.settings import param
 
 _DRAWS_PER_ITERATION = 1000
@@ -18,7 +18,7 @@ _DRAWS_PER_ITERATION = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class RRT(LoopPlanner):
+class RRT(KernelPlanner):
     """Rapidly-exploring random tree (LaValle 1998): one tree, grown from the start.
 
     Each iteration draws a configuration, steers towards it from the nearest node by at most
@@ -49,8 +49,8 @@ class RRT(LoopPlanner):
     def _step(self, problem: Problem) -> float:
         return self.step or 0.05 * problem.world.extent
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.loop`."""
         options = _rrt.Options(
             step=self._step(problem),
             goal_bias=self.goal_bias,
@@ -66,7 +66,7 @@ class RRT(LoopPlanner):
         )
         tree.counts[_rrt.GOAL_NODE] = -1
         draws = 1 if self.count_failed else _DRAWS_PER_ITERATION
-        return Loop(
+        return Kernel(
             _rrt.advance, tree, options, _grown, options.slices + 4, draws * stop.iterations
         )
 

@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 from typing import Any
 
+from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
 from brrt.planners.bi_rrt import BiRRT
-from brrt.planners.contract import Contract
-from brrt.planners.drive import Loop, LoopPlanner
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.scenario.contract import Contract
 from brrt.settings import param
 
 
 @dataclass(frozen=True, slots=True)
-class RRTConnect(LoopPlanner):
+class RRTConnect(KernelPlanner):
     """RRT-Connect (Kuffner and LaValle 2000): two trees, joined greedily.
 
     One tree makes a step towards a sample, and the other one steps towards the new node until it
@@ -27,8 +27,8 @@ class RRTConnect(LoopPlanner):
         """See `Planner.contract`."""
         return self._variant.contract(problem)
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.loop`."""
         return self._variant.loop(problem, stop)
 
     @property

@@ -7,12 +7,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from brrt.kernels.forest import grown, grown_forest, rooted_forest
-from brrt.planners import _star
+from brrt.planners import _rrt_star
+from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelPlanner
+from brrt.planners.base.problem import Problem
+from brrt.planners.base.stop import Stop
 from brrt.planners.bi_rrt import step_length
-from brrt.planners.contract import Contract, Draws, Growth, Near
-from brrt.planners.drive import UNCOUNTED, Loop, LoopPlanner
-from brrt.planners.stop import Stop
-from brrt.problem import Problem
+from brrt.scenario.contract import Contract, Draws, Growth, Near
 from brrt.settings import param
 
 DEFAULT_STEP = 0.2
@@ -21,11 +21,11 @@ looks for parents, and with so few of them a tree improves slowly."""
 
 
 @dataclass(frozen=True, slots=True)
-class StarPlanner(LoopPlanner):
+class StarPlanner(KernelPlanner):
     """What RRT* has in common, with one tree and with two."""
 
     default_iterations: ClassVar[int] = 20_000
-    onward: ClassVar[str] = "let it improve on its path: --param stop_at_first=false"
+    resume_hint: ClassVar[str] = "let it improve on its path: --param stop_at_first=false"
 
     step: float | None = param(
         None, "longest edge; 20 % of the map's longest side by default", above=0
@@ -56,17 +56,17 @@ class StarPlanner(LoopPlanner):
             stops=options.stop_at_first,
         )
 
-    def retracing(self, problem: Problem) -> Loop[Any]:
-        """See `LoopPlanner.retracing`."""
-        return replace(self, stop_at_first=False).loop(problem, Stop(iterations=UNCOUNTED))
+    def retracing(self, problem: Problem) -> Kernel[Any]:
+        """See `KernelPlanner.retracing`."""
+        return replace(self, stop_at_first=False).loop(problem, Stop(iterations=UNLIMITED))
 
     def ends_where(self, other: Self) -> bool:  # noqa: ARG002
-        """See `LoopPlanner.ends_where`."""
+        """See `KernelPlanner.ends_where`."""
         return self.stop_at_first
 
-    def options(self, problem: Problem) -> _star.Options:
+    def options(self, problem: Problem) -> _rrt_star.Options:
         """Return what the loop needs, with lengths resolved for a problem."""
-        return _star.Options(
+        return _rrt_star.Options(
             step=step_length(self.step, problem, DEFAULT_STEP),
             goal_bias=0.0,
             gamma=self.gamma or proven_gamma(problem),
@@ -89,12 +89,12 @@ class RRTStar(StarPlanner):
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
 
-    def options(self, problem: Problem) -> _star.Options:
+    def options(self, problem: Problem) -> _rrt_star.Options:
         """See `StarPlanner.options`."""
         return StarPlanner.options(self, problem)._replace(goal_bias=self.goal_bias)
 
-    def loop(self, problem: Problem, stop: Stop) -> Loop[Any]:
-        """See `LoopPlanner.loop`."""
+    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.loop`."""
         return loop_of(self.options(problem), problem.start[None], problem, stop)
 
 
@@ -111,19 +111,19 @@ def proven_gamma(problem: Problem) -> float:
 
 
 def loop_of(
-    options: _star.Options, roots: np.ndarray, problem: Problem, stop: Stop
-) -> Loop[_star.Star]:
+    options: _rrt_star.Options, roots: np.ndarray, problem: Problem, stop: Stop
+) -> Kernel[_rrt_star.Star]:
     """Make the loop for one tree or two, by their roots, shape (trees, dof)."""
     forest = rooted_forest(roots, len(roots) + 1 + len(roots) * (stop.iterations + 1))
     n = len(forest.parent)
-    counts = np.zeros(_star.COUNTS, np.int64)
-    counts[[_star.GOAL_NODE, _star.BEST]] = -1
-    counts[_star.NEWEST + 1] = len(roots) - 1
+    counts = np.zeros(_rrt_star.COUNTS, np.int64)
+    counts[[_rrt_star.GOAL_NODE, _rrt_star.BEST]] = -1
+    counts[_rrt_star.NEWEST + 1] = len(roots) - 1
     if len(roots) == 1:
         far = float(problem.robot.distance(problem.start, problem.goal))
-        counts[_star.GOAL_NEAR] = 0 < far <= options.step
-        counts[_star.GOAL_NODE] = -int(far > 0)
-    star = _star.Star(
+        counts[_rrt_star.GOAL_NEAR] = 0 < far <= options.step
+        counts[_rrt_star.GOAL_NODE] = -int(far > 0)
+    star = _rrt_star.Star(
         forest=forest,
         edge=np.zeros(n),
         child=np.empty(n, np.int32),
@@ -142,10 +142,10 @@ def loop_of(
     star.child[: len(roots)] = -1
     star.sibling[: len(roots)] = -1
     star.linked[: len(roots)] = -1
-    return Loop(_star.advance, star, options, _grown, 8, stop.iterations)
+    return Kernel(_rrt_star.advance, star, options, _grown, 8, stop.iterations)
 
 
-def _grown(star: _star.Star) -> _star.Star:
+def _grown(star: _rrt_star.Star) -> _rrt_star.Star:
     n, forest = int(star.forest.nodes[0]), grown_forest(star.forest)
     names = ["edge", "child", "sibling", "near", "far", "known", "stack"]
     # There are no more links than nodes.

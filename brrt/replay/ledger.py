@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Table
-from brrt.kernels.jit import borrowing, kernel
+from brrt.kernels.jit import helper, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -231,7 +231,7 @@ _CHILD, _NEXT, _LAST = range(3)
 """Columns of the links: a node's first child, its next sibling, its sibling before."""
 
 
-@borrowing
+@helper
 def _below(root: int, at: int, parent: Ints, links: Ints) -> int:
     """Return the descendant of `root` that comes after `at` on a walk from above, or -1."""
     if links[at, _CHILD] >= 0:
@@ -241,7 +241,7 @@ def _below(root: int, at: int, parent: Ints, links: Ints) -> int:
     return -1 if at == root else int(links[at, _NEXT])
 
 
-@borrowing
+@helper
 def _descends(root: int, node: int, parent: Ints) -> bool:
     """Whether `node` is `root` or below it."""
     while node not in (-1, root):
@@ -249,7 +249,7 @@ def _descends(root: int, node: int, parent: Ints) -> bool:
     return node == root
 
 
-@borrowing
+@helper
 def _leave(v: int, parent: Ints, links: Ints) -> None:
     """Take a node from among its parent's children."""
     after, ahead = links[v, _NEXT], links[v, _LAST]
@@ -261,7 +261,7 @@ def _leave(v: int, parent: Ints, links: Ints) -> None:
         links[after, _LAST] = ahead
 
 
-@borrowing
+@helper
 def _join(v: int, p: int, parent: Ints, links: Ints) -> None:
     """Put a node first among a parent's children."""
     first = links[p, _CHILD]
@@ -271,7 +271,7 @@ def _join(v: int, p: int, parent: Ints, links: Ints) -> None:
         links[first, _LAST] = v
 
 
-@borrowing
+@helper
 def _answer(
     question: int, i: int, moments: Ints, asked: Ints, answers: Floats, cost: Floats, born: int
 ) -> int:

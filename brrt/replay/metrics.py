@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
-from brrt.manifest import Manifest
-from brrt.scenario import Scenario
+from brrt.scenario.manifest import Manifest
+from brrt.scenario.scenario import Scenario
 
 Path = tuple[float, NDArray[np.float64]]
 """Cost and waypoints."""

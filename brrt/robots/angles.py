@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.kernels.jit import inlined
+from brrt.kernels.jit import inline_helper
 
 Floats = NDArray[np.float64]
 
@@ -13,7 +13,7 @@ TURN, HALF_TURN = 2 * math.pi, math.pi
 _LAST = math.nextafter(math.pi, 0)
 
 
-@inlined
+@inline_helper
 def turn_between(a: float, b: float) -> float:
     """Angle from a to b the short way round; both in [-pi, pi]."""
     step = b - a
@@ -24,7 +24,7 @@ def turn_between(a: float, b: float) -> float:
     return step
 
 
-@inlined
+@inline_helper
 def angle_apart(a: float, b: float) -> float:
     """Return the size of the angle between a and b, both in [-pi, pi].
 
@@ -34,7 +34,7 @@ def angle_apart(a: float, b: float) -> float:
     return max(0.0, min(step, TURN - step))
 
 
-@inlined
+@inline_helper
 def angle_to_range(low: float, high: float, a: float) -> float:
     """Least size of the angle between a and anything in [low, high]."""
     if low <= a <= high:
@@ -44,7 +44,7 @@ def angle_to_range(low: float, high: float, a: float) -> float:
     return max(0.0, min(a - high, TURN - (a - low)))
 
 
-@inlined
+@inline_helper
 def wrapped(a: float) -> float:
     """Return an angle less than a turn out of range as one in [-pi, pi)."""
     if a >= HALF_TURN:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.kernels.convex import Body, Scenery, Shapes, build_body, build_scenery, motion_free
 from brrt.kernels.convex import place_part as place_shape
-from brrt.kernels.jit import inlined
+from brrt.kernels.jit import inline_helper
 from brrt.robots.angles import (
     all_wrapped,
     angle_apart,
@@ -55,7 +55,7 @@ class Joint(NamedTuple):
 
 
 class ChainSpace(NamedTuple):
-    """Angles of a chain; see `brrt.kernels.space` for what the kernels mean.
+    """Angles of a chain; see `brrt.kernels.spaces.space` for what the kernels mean.
 
     Attributes:
         lower: Least angles.
@@ -82,7 +82,7 @@ class ChainSpace(NamedTuple):
     body: Body
 
     @staticmethod
-    @inlined
+    @inline_helper
     def measure(space: "ChainSpace", A: Floats, i: int, B: Floats, j: int) -> float:
         """Greatest over the joints of angle times reach."""
         most = 0.0
@@ -94,13 +94,13 @@ class ChainSpace(NamedTuple):
         return most
 
     @staticmethod
-    @inlined
+    @inline_helper
     def length(space: "ChainSpace", measured: float) -> float:  # noqa: ARG004
         """It is a distance already."""
         return measured
 
     @staticmethod
-    @inlined
+    @inline_helper
     def box_measure(space: "ChainSpace", boxes: Floats, b: int, Q: Floats, i: int) -> float:
         """Greatest over the joints of the angle to the box, either way round, times reach."""
         d, most = len(space.lower), 0.0
@@ -113,7 +113,7 @@ class ChainSpace(NamedTuple):
         return most
 
     @staticmethod
-    @inlined
+    @inline_helper
     def interpolate(
         space: "ChainSpace",
         A: Floats,
@@ -133,13 +133,13 @@ class ChainSpace(NamedTuple):
                 out[row, k] = min(max(q, space.lower[k]), space.upper[k])
 
     @staticmethod
-    @inlined
+    @inline_helper
     def segment_free(space: "ChainSpace", A: Floats, i: int, B: Floats, j: int) -> bool:
         """Free everywhere on the way: see `brrt.kernels.convex`."""
         return motion_free(space, A, i, B, j)
 
     @staticmethod
-    @inlined
+    @inline_helper
     def place(space: "ChainSpace", A: Floats, i: int, B: Floats, j: int, part: float) -> None:
         """Put the links in place from the base outwards."""
         x, y = space.base
@@ -155,7 +155,7 @@ class ChainSpace(NamedTuple):
             place_shape(space.parts, space.body.placed, k, x, y, cos, sin)
 
     @staticmethod
-    @inlined
+    @inline_helper
     def bound_moves(space: "ChainSpace", A: Floats, i: int, B: Floats, j: int) -> None:
         """Sum what each joint on the way from the base, or from another link, adds."""
         body, n, pair = space.body, len(space.lower), 0
@@ -183,7 +183,7 @@ class Chain(Robot):
     the joints in their ends, in the middle of the map.
 
     Attributes:
-        joints: Joints and links from the base outwards; empty until the robot is `settled` in a
+        joints: Joints and links from the base outwards; empty until the robot is `resolved` in a
             world, where no file gave them.
     """
 
@@ -230,8 +230,8 @@ class Chain(Robot):
             raise BrrtError(f"robot: self_collision must be true or false, not {touching!r}")
         return cls(len(joints), self_collision=touching, base_x=x, base_y=y, joints=joints)
 
-    def settled(self, world: World) -> Self:
-        """See `Robot.settled`."""
+    def resolved(self, world: World) -> Self:
+        """See `Robot.resolved`."""
         plane_only(self.kind, world)
         x, y = ((world.lower + world.upper) / 2).tolist()
         x, y = (m if own is None else own for own, m in ((self.base_x, x), (self.base_y, y)))

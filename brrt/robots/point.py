@@ -7,8 +7,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.kernels.grid import Obstacles, build_obstacles, segment_hits
-from brrt.kernels.jit import inlined
+from brrt.kernels.broad_phase import Obstacles, build_obstacles, segment_hits
+from brrt.kernels.jit import inline_helper
 from brrt.kernels.random import Random, uniform
 from brrt.robots.robot import Robot
 from brrt.worlds.world import World
@@ -20,7 +20,7 @@ _INFORMED_DRAWS = 1000
 
 
 class PointSpace(NamedTuple):
-    """Positions of a point; see `brrt.kernels.space` for what the kernels mean.
+    """Positions of a point; see `brrt.kernels.spaces.space` for what the kernels mean.
 
     Attributes:
         lower: Least coordinates, one number an axis.
@@ -33,7 +33,7 @@ class PointSpace(NamedTuple):
     obstacles: Obstacles
 
     @staticmethod
-    @inlined
+    @inline_helper
     def measure(space: "PointSpace", A: Floats, i: int, B: Floats, j: int) -> float:
         """Square of the Euclidean distance."""
         total = 0.0
@@ -43,13 +43,13 @@ class PointSpace(NamedTuple):
         return total
 
     @staticmethod
-    @inlined
+    @inline_helper
     def length(space: "PointSpace", measured: float) -> float:  # noqa: ARG004
         """Root of the square."""
         return math.sqrt(measured)
 
     @staticmethod
-    @inlined
+    @inline_helper
     def box_measure(space: "PointSpace", boxes: Floats, b: int, Q: Floats, i: int) -> float:
         """Square of the distance to a box."""
         d, total = len(space.lower), 0.0
@@ -59,7 +59,7 @@ class PointSpace(NamedTuple):
         return total
 
     @staticmethod
-    @inlined
+    @inline_helper
     def interpolate(
         space: "PointSpace",
         A: Floats,
@@ -76,13 +76,13 @@ class PointSpace(NamedTuple):
             out[row, k] = min(max(q, space.lower[k]), space.upper[k])
 
     @staticmethod
-    @inlined
+    @inline_helper
     def segment_free(space: "PointSpace", A: Floats, i: int, B: Floats, j: int) -> bool:
         """Exact against every shape; bounds are convex, so the ends decide about them."""
         return not segment_hits(space.obstacles, A, i, B, j)
 
     @staticmethod
-    @inlined
+    @inline_helper
     def sample_informed(
         space: "PointSpace",
         rng: Random,
@@ -122,7 +122,7 @@ class PointSpace(NamedTuple):
                 return
 
 
-@inlined
+@inline_helper
 def _mirror(ends: Floats, start: int, goal: int, focal: float, k: int) -> float:
     """Component of the first axis less the direction from start to goal; 0 where these coincide."""
     if focal == 0.0:
@@ -130,7 +130,7 @@ def _mirror(ends: Floats, start: int, goal: int, focal: float, k: int) -> float:
     return float((1.0 if k == 0 else 0.0) - (ends[goal, k] - ends[start, k]) / focal)
 
 
-@inlined
+@inline_helper
 def _sample_unit_ball(rng: Random, d: int, out: Floats, row: int) -> None:
     norm = 2.0
     while norm > 1.0:

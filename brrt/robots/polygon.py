@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.kernels.convex import Body, Scenery, Shapes, build_body, build_scenery, motion_free
 from brrt.kernels.convex import place_part as place_shape
-from brrt.kernels.jit import inlined
+from brrt.kernels.jit import inline_helper
 from brrt.robots.angles import (
     all_wrapped,
     angle_apart,
@@ -34,7 +34,7 @@ _SAFE = 1.0 + 1e-12
 
 
 class PolygonSpace(NamedTuple):
-    """Poses of a polygon; see `brrt.kernels.space` for what the kernels mean.
+    """Poses of a polygon; see `brrt.kernels.spaces.space` for what the kernels mean.
 
     Attributes:
         lower: Least x, y, theta.
@@ -55,20 +55,20 @@ class PolygonSpace(NamedTuple):
     body: Body
 
     @staticmethod
-    @inlined
+    @inline_helper
     def measure(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int) -> float:
         """Distance of the reference points, and the way of the farthest vertex about its own."""
         dx, dy = B[j, 0] - A[i, 0], B[j, 1] - A[i, 1]
         return math.sqrt(dx * dx + dy * dy) + space.radius * angle_apart(A[i, 2], B[j, 2])
 
     @staticmethod
-    @inlined
+    @inline_helper
     def length(space: "PolygonSpace", measured: float) -> float:  # noqa: ARG004
         """It is a distance already."""
         return measured
 
     @staticmethod
-    @inlined
+    @inline_helper
     def box_measure(space: "PolygonSpace", boxes: Floats, b: int, Q: Floats, i: int) -> float:
         """Distance to the box in the plane, and to its range of angles either way round."""
         dx = max(0.0, boxes[b, 0] - Q[i, 0], Q[i, 0] - boxes[b, 3])
@@ -77,7 +77,7 @@ class PolygonSpace(NamedTuple):
         return math.sqrt(dx * dx + dy * dy) + space.radius * turn
 
     @staticmethod
-    @inlined
+    @inline_helper
     def interpolate(
         space: "PolygonSpace",
         A: Floats,
@@ -96,13 +96,13 @@ class PolygonSpace(NamedTuple):
         out[row, 2] = theta
 
     @staticmethod
-    @inlined
+    @inline_helper
     def segment_free(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int) -> bool:
         """Free everywhere on the way: see `brrt.kernels.convex`."""
         return motion_free(space, A, i, B, j)
 
     @staticmethod
-    @inlined
+    @inline_helper
     def place(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int, part: float) -> None:
         """Turn all parts about the reference point."""
         x = A[i, 0] + (B[j, 0] - A[i, 0]) * part
@@ -113,7 +113,7 @@ class PolygonSpace(NamedTuple):
             place_shape(space.parts, space.body.placed, shape, x, y, cos, sin)
 
     @staticmethod
-    @inlined
+    @inline_helper
     def bound_moves(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int) -> None:
         """As the metric, with each part's own radius."""
         dx, dy = B[j, 0] - A[i, 0], B[j, 1] - A[i, 1]
@@ -172,8 +172,8 @@ class Polygon(Robot):
     def _reaches(self) -> Floats:
         return np.array([np.hypot(*part.T).max() for part in self.parts])
 
-    def settled(self, world: World) -> Self:
-        """See `Robot.settled`."""
+    def resolved(self, world: World) -> Self:
+        """See `Robot.resolved`."""
         plane_only(self.kind, world)
         return self
 

@@ -28,7 +28,7 @@ class Robot(Settings):
 
     kind: ClassVar[str]
 
-    def settled(self, world: World) -> Self:  # noqa: ARG002
+    def resolved(self, world: World) -> Self:  # noqa: ARG002
         """Return the robot with everything decided that its settings leave to the world.
 
         Raises:

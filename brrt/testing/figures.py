@@ -11,8 +11,8 @@ from typing import Any, Self
 from brrt.errors import BrrtError
 from brrt.files import read_text, replacing
 from brrt.replay.metrics import Metrics
-from brrt.run import Run, made_by
-from brrt.scenario import Scenario
+from brrt.runs.run import Run, made_by
+from brrt.scenario.scenario import Scenario
 
 SCHEMA, VERSION = "brrt.figures", 1
 

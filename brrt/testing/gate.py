@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
-from brrt.replay.explain.command import command
-from brrt.scenario import Scenario
+from brrt.scenario.command import command
+from brrt.scenario.scenario import Scenario
 from brrt.testing import ranks
 from brrt.testing.figures import PROBLEM, Figures, Source
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from brrt.again import RepeatedRun
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.files import replacing
+from brrt.formats import McapSink, Memory, Recording, read
 from brrt.planners import PLANNERS
-from brrt.recording import McapSink, Memory, Recording, read
-from brrt.run import Run
-from brrt.scenario import Scenario
+from brrt.runs.branched import RepeatedRun
+from brrt.runs.run import Run
+from brrt.scenario.scenario import Scenario
 
 TICK_NS = 1000
 """Between two events by the logical clock."""

@@ -358,7 +358,7 @@ class World:
         Raises:
             BrrtError: matplotlib is missing, or the axes are not for this world.
         """
-        from brrt.worlds.picture import plot  # noqa: PLC0415 - matplotlib is an extra
+        from brrt.views.matplotlib.draw_world import plot  # noqa: PLC0415 - matplotlib is an extra
 
         return plot(self, ax)
 

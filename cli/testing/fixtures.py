@@ -13,7 +13,7 @@ from typing import NoReturn
 import pytest
 
 from brrt import BrrtError, Comparison, Recording, compare, read
-from brrt.repeat import TOLERANCE
+from brrt.runs.reproduce import TOLERANCE
 from brrt.testing import golden
 from brrt.testing.figures import Figures, Source
 from brrt.testing.gate import ALPHA, SEEDS, Verdict, check_question, gate

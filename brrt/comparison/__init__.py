@@ -1,0 +1,1 @@
+"""Compare two runs: settings, figures, and the first event that differs."""

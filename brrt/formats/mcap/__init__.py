@@ -1,0 +1,1 @@
+"""MCAP: reader and writer."""

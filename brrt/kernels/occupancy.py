@@ -1,0 +1,103 @@
+"""Segments among the cells of an occupancy grid: walked exactly, over free stretches in strides."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.kernels.jit import helper, inline_helper
+from brrt.worlds.world import World
+
+_STRIDES = 16
+"""Longest stride, in cells: what finding them costs grows with it."""
+
+_SLACK = 4e-15
+"""Bound on the rounding of a place among the cells, as a part of the lengths at hand: six
+roundings of 1.1e-16 on the way to the grid's axes, and four along the segment."""
+
+
+class Cells(NamedTuple):
+    """An occupancy grid.
+
+    Attributes:
+        clearance: 0 in blocked cells; k where all cells less than k columns and rows away are
+            free; shape (rows, columns). Empty where a world has no grid.
+        frame: Origin x and y, cosine and sine of the yaw, cells per unit of length.
+    """
+
+    clearance: NDArray[np.uint8]
+    frame: tuple[float, float, float, float, float]
+
+
+def build_cells(world: World) -> Cells:
+    """Find how far each cell of a world's grid is from blocked ones.
+
+    Where the world reaches beyond the grid, a ring of blocked cells stands for all outside.
+    """
+    grid = world.grid
+    if grid is None:
+        return Cells(np.empty((0, 0), np.uint8), (0.0, 0.0, 1.0, 0.0, 1.0))
+    taken, origin = grid.cells, grid.origin
+    if not grid.reaches_all_of(world.lower, world.upper):
+        taken, origin = (
+            np.pad(taken, 1, constant_values=True),
+            grid.to_world(np.full(2, -grid.resolution)),
+        )
+    clearance = np.where(taken, 0, 1).astype(np.uint8)
+    for _ in range(_STRIDES - 1):
+        taken = _wider(taken)
+        clearance += ~taken
+    cos, sin = grid.axes
+    return Cells(clearance, (*origin.tolist(), cos, sin, 1.0 / grid.resolution))
+
+
+def _wider(taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Add all neighbours, corners included."""
+    for first, last in ((np.s_[1:], np.s_[:-1]), (np.s_[:, 1:], np.s_[:, :-1])):
+        wider = taken.copy()
+        wider[first] |= taken[last]
+        wider[last] |= taken[first]
+        taken = wider
+    return taken
+
+
+@inline_helper
+def _cell(at: float, count: int) -> int:
+    return int(max(min(np.floor(at), count - 1.0), 0.0))
+
+
+@helper
+def segment_hits_cells(cells: Cells, ax: float, ay: float, dx: float, dy: float) -> bool:
+    """Whether the closed segment from (ax, ay) along (dx, dy) touches a blocked cell.
+
+    The segment is walked along its longer side, column by column; a corner that it passes belongs
+    to all four cells around it, so none is cut. From a cell with clearance k the next k - 1
+    columns need no look: a segment gets away by a row a column at most.
+    """
+    clearance, (ox, oy, cos, sin, per_length) = cells.clearance, cells.frame
+    px, py = ax - ox, ay - oy
+    u, v = (cos * px + sin * py) * per_length, (cos * py - sin * px) * per_length
+    du, dv = (cos * dx + sin * dy) * per_length, (cos * dy - sin * dx) * per_length
+    slack = _SLACK * (abs(px) + abs(py) + abs(dx) + abs(dy)) * per_length
+    rows, columns = clearance.shape
+    steep = abs(dv) > abs(du)
+    if steep:
+        u, v, du, dv, rows, columns = v, u, dv, du, columns, rows
+    slope = 0.0 if du == 0.0 else dv / du
+    low, high = min(u, u + du), max(u, u + du)
+    column, last = _cell(low - slack, columns), _cell(high + slack, columns)
+    while column <= last:
+        # Outside the grid, by rounding or for good, is where its outermost cells are.
+        left = low if column == 0 else min(max(low, float(column)), high)
+        right = high if column == columns - 1 else max(min(high, column + 1.0), low)
+        one, two = v + (left - u) * slope, v + (right - u) * slope
+        stride = _STRIDES
+        for row in range(
+            _cell(min(one, two) - slack, rows), _cell(max(one, two) + slack, rows) + 1
+        ):
+            free = int(clearance[column, row] if steep else clearance[row, column])
+            if free == 0:
+                return True
+            stride = min(stride, free)
+        column += stride
+    return False

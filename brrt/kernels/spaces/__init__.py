@@ -1,0 +1,1 @@
+"""Configuration spaces of robots as kernels see them."""

@@ -1,0 +1,1 @@
+"""What planners share: the problem, the budget, the interface, the compiled loop."""

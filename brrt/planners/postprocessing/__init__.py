@@ -1,0 +1,1 @@
+"""What follows planning: shortcut smoothing and execution in moves."""

@@ -1,0 +1,64 @@
+"""The compiled loop of the real-time mode."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Kind
+from brrt.kernels.emit import Buffer, emit, room
+from brrt.kernels.jit import kernel
+from brrt.kernels.spaces.space import distance, interpolate
+
+Floats = NDArray[np.float64]
+
+MOVE = int(Kind.MOVE)
+
+MOTION, PART, STEP, PLACES = range(4)
+"""Places in `place`: the motion of the path, moves of it that are made, and moves in all; and how
+many places there are."""
+
+
+@kernel
+def walk(
+    path: Floats,
+    place: NDArray[np.int64],
+    cost: Floats,
+    q: Floats,
+    space: Any,
+    log: Buffer,
+    iteration: int,
+    max_move: float,
+) -> bool:
+    """Make moves until the end of the path or the log is full; return whether it is the end.
+
+    Args:
+        path: Waypoints, shape (n, dof).
+        place: How far the robot has come, shape (PLACES,).
+        cost: Length of the moves so far, shape (1,).
+        q: Where a move leads, shape (1, dof).
+        space: Configuration space.
+        log: Events.
+        iteration: The planner's count, for the events.
+        max_move: Longest move.
+    """
+    while place[MOTION] < len(path) - 1:
+        i = place[MOTION]
+        far = distance(space, path, i, path, i + 1)
+        # Cutting rounds; a move must not become longer than allowed by that.
+        moves = max(1, math.ceil(far / max_move * (1.0 - 1e-12)))
+        while place[PART] < moves:
+            if room(log) < 1:
+                return False
+            place[PART] += 1
+            place[STEP] += 1
+            for k in range(path.shape[1]):
+                q[0, k] = path[i + 1, k]
+            if place[PART] < moves:
+                interpolate(space, path, i, path, i + 1, place[PART] / moves, q, 0)
+            cost[0] += far / moves
+            emit(log, MOVE, iteration, 0, place[STEP], -1, cost[0], q, 0)
+        place[MOTION] += 1
+        place[PART] = 0
+    return True

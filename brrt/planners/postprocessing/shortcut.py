@@ -1,0 +1,71 @@
+"""Shortcut smoothing (Geraerts and Overmars 2007): random pairs, joined directly where free."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Events, Kind, Phase, Stage, Status
+from brrt.kernels.emit import EventLog
+from brrt.kernels.random import borrow, give_back
+from brrt.planners.base.stop import Stop
+from brrt.planners.postprocessing import _shortcut
+from brrt.settings import Settings, param
+
+
+@dataclass(frozen=True, slots=True)
+class Shortcut(Settings):
+    """Pick two waypoints at random; replace what lies between by a direct motion if it is free.
+
+    The cost never rises and the ends never move.
+    """
+
+    attempts: int = param(100, "pairs to try", low=0)
+
+    def smooth(
+        self,
+        path: NDArray[np.float64],
+        space: Any,
+        rng: np.random.Generator,
+        log: EventLog,
+        stop: Stop,
+        iteration: int,
+    ) -> Iterator[Events]:
+        """Yield batches of events; the last but one event is the smoothed path.
+
+        Args:
+            path: Waypoints, shape (n, dof), n at least 1.
+            space: Configuration space, as kernels see it.
+            rng: Every random draw comes from here.
+            log: Numbers and times the events.
+            stop: Interruption; the planner's budget does not count here.
+            iteration: The planner's count, for the events.
+        """
+        if log.room < 3:
+            yield log.drain()
+        log.emit(Kind.PHASE, iteration, name=Phase.SMOOTH, status=Status.BEGIN)
+        draws = borrow(rng)
+        points, counts, cost = path.copy(), np.array([len(path), 0]), np.zeros(1)
+        while True:
+            log.tick()
+            _shortcut.shorten(
+                points, counts, cost, space, draws, log.buffer, iteration, self.attempts
+            )
+            waypoints, made = (int(n) for n in counts)
+            if log.room < 2:
+                yield log.drain()
+            if stop.interrupted or made >= self.attempts or waypoints <= 2:
+                break
+        give_back(draws, rng)
+        log.emit(
+            Kind.PATH,
+            iteration,
+            stage=Stage.SMOOTHED,
+            cost=cost[0],
+            waypoints=points[:waypoints],
+        )
+        status = Status.INTERRUPTED if stop.interrupted else Status.DONE
+        log.emit(Kind.PHASE, iteration, name=Phase.SMOOTH, status=status)
+        yield log.drain()

@@ -1,0 +1,218 @@
+"""A run told in plain text: the same on every machine, so that accounts can be compared.
+
+Times, versions and folders are left out, and numbers are rounded to six digits.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
+from brrt.robots import Robot
+from brrt.scenario.manifest import Manifest
+
+Line = tuple[int, str]
+"""Iteration and text."""
+
+_LEAST_GAIN = 0.01
+"""How much better a path must be than the last one told of; there may be thousands."""
+
+_COUNTED: Mapping[Kind, tuple[str, str | None]] = {
+    Kind.SAMPLE: ("samples", "source"),
+    Kind.EDGE: ("nodes", "tree"),
+    Kind.REJECT: ("rejected", "reason"),
+    Kind.REWIRE: ("rewired", None),
+    Kind.CONNECT: ("links", None),
+    Kind.EXPAND: ("cells expanded", None),
+    Kind.HEURISTIC: ("estimates raised", None),
+    Kind.SHORTCUT: ("shortcuts", "accepted"),
+    Kind.MOVE: ("moves", None),
+}
+"""What the events of a phase are called, and the field that tells them apart."""
+
+
+class Transcript:
+    """A sink that tells what happened; its memory does not grow with the run.
+
+    Args:
+        manifest: The run's.
+        robot: What moves; measures how near to the goal the tree came.
+    """
+
+    def __init__(self, manifest: Manifest, robot: Robot) -> None:
+        self._manifest, self._robot = manifest, robot
+        self._told: list[Line] = []
+        self._counts: dict[tuple[Kind, int], int] = {}
+        self._path: Any = None
+        self._best = np.inf
+        self._skipped: Line | None = None
+        self._nearest = (np.inf, -1, 0)
+        self._iteration = 0
+
+    def write(self, events: Events) -> None:
+        """Take in a batch."""
+        marks = [*events[Kind.PHASE], *events[Kind.PATH]]
+        marks.sort(key=lambda event: int(event["seq"]))
+        first = 0
+        for event in marks:
+            self._count(events, first, int(event["seq"]))
+            first = int(event["seq"])
+            if "stage" in event.dtype.names:
+                self._tell_path(event)
+            else:
+                self._tell_phase(event)
+        self._count(events, first, np.iinfo(np.int64).max)
+        if len(events):
+            self._iteration = max(self._iteration, events.last.iteration)
+
+    def close(self, *, whole: bool = True) -> None:
+        """Nothing to release."""
+
+    def lines(self) -> Iterator[str]:
+        """Tell what is known so far, line by line."""
+        yield from self._head()
+        told = [*self._told, *self._newest(), *self._counted()]
+        width = max((len(f"{number:,}") for number, _ in told), default=1)
+        before = None
+        for number, text in told:
+            count = "" if number == before else f"{number:,}"
+            yield f"{count:>{width}}  {text}"
+            before = number
+
+    def _head(self) -> Iterator[str]:
+        scenario = self._manifest.scenario
+        world, robot = (_last_name(spec) for spec in (scenario.world, scenario.robot))
+        yield f"{scenario.planner} · {robot} · {world} · seed {scenario.seed}"
+        settings = scenario.settings()
+        if settings:
+            yield "with " + ", ".join(f"{name} {_text(value)}" for name, value in settings.items())
+        ends = (self._manifest.start, self._manifest.goal)
+        yield "from {} to {}".format(*(", ".join(map(_text, q)) for q in ends))
+        for branch, (_, after) in zip(
+            self._manifest.branches, self._manifest.stretches[1:], strict=True
+        ):
+            yield f"at iteration {branch.iteration:,} of {branch.file}: " + branch.told(after)
+
+    def _count(self, events: Events, first: int, end: int) -> None:
+        """Count the events whose numbers lie in a range."""
+        for kind, (_, choice) in _COUNTED.items():
+            table = events[kind]
+            part = table[np.searchsorted(table["seq"], first) : np.searchsorted(table["seq"], end)]
+            if not len(part):
+                continue
+            values = np.zeros(len(part), int) if choice is None else part[choice].astype(int)
+            for value, count in zip(*np.unique(values, return_counts=True), strict=True):
+                key = (kind, int(value))
+                self._counts[key] = self._counts.get(key, 0) + int(count)
+            if kind is Kind.EDGE:
+                self._approach(part)
+
+    def _approach(self, edges: Table) -> None:
+        """Keep the node of the start's tree that came nearest to the goal."""
+        mine = edges[edges["tree"] == 0]
+        if len(mine):
+            goal = np.array(self._manifest.goal)
+            far: NDArray[np.float64] = self._robot.distance(mine["q"], goal)
+            best = int(far.argmin())
+            here = (float(far[best]), int(mine["node"][best]), int(mine["iteration"][best]))
+            self._nearest = min(self._nearest, here, key=lambda found: found[0])
+
+    def _tell_phase(self, event: Any) -> None:
+        phase, status = Phase(int(event["name"])), Status(int(event["status"]))
+        iteration = int(event["iteration"])
+        if status is Status.BEGIN:
+            self._told.append((iteration, f"{phase.name.lower()} begins"))
+            return
+        self._told += self._newest()
+        self._told += [(iteration, text) for _, text in self._counted()]
+        self._counts.clear()
+        self._skipped = None
+        how = status.name.lower().replace("_", " ")
+        self._told.append((iteration, f"{phase.name.lower()} ends: {how}"))
+        if phase is Phase.PLAN and self._path is None:
+            self._told += [(iteration, text) for text in self._failure()]
+
+    def _failure(self) -> Iterator[str]:
+        far, node, iteration = self._nearest
+        yield "no path"
+        if np.isfinite(far):
+            yield (
+                f"nearest to the goal: node {node:,} of iteration {iteration:,}, "
+                f"{far:.6g} away from it"
+            )
+
+    def _tell_path(self, event: Any) -> None:
+        stage, cost = Stage(int(event["stage"])), float(event["cost"])
+        waypoints = len(event["waypoints"])
+        name = "first path" if self._path is None else f"{stage.name.lower()} path"
+        text = f"{name}: cost {cost:.6g}, {waypoints} waypoints"
+        if self._path is not None and self._path > 0:
+            text += f", {100 * (1 - cost / self._path):.2f} % less than the first"
+        line = (int(event["iteration"]), text)
+        self._path = cost if self._path is None else self._path
+        if stage is Stage.IMPROVED and cost > (1 - _LEAST_GAIN) * self._best:
+            self._skipped = line
+            return
+        self._best, self._skipped = cost, None
+        self._told.append(line)
+
+    def _newest(self) -> list[Line]:
+        """Tell of the best path so far, if it was not worth it when it came."""
+        return [] if self._skipped is None else [self._skipped]
+
+    def _counted(self) -> Iterator[Line]:
+        """Say what was counted since the phase began."""
+        for kind, (word, choice) in _COUNTED.items():
+            found = {value: n for (k, value), n in sorted(self._counts.items()) if k is kind}
+            if not found:
+                continue
+            total = sum(found.values())
+            text = f"{total:,} {word.removesuffix('s') if total == 1 else word}"
+            named = _named(kind, choice, found)
+            yield self._iteration, f"{text}: {named}" if named else text
+
+
+def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
+    """Say how many there are of each sort, where there are sorts."""
+    if choice is None or (choice == "tree" and len(found) == 1):
+        return ""
+    if choice == "accepted":
+        return f"{found.get(1, 0):,} accepted"
+    if choice == "tree":
+        return ", ".join(f"{n:,} in tree {tree}" for tree, n in found.items())
+    choices = next(field.choices for field in FIELDS[kind] if field.name == choice)
+    return ", ".join(f"{n:,} {choice_name(choices, value)}" for value, n in found.items())
+
+
+def choice_name(choices: type[IntEnum] | None, value: int) -> str:
+    """Name a choice in words; a number that is none of the choices stays what it is."""
+    known = choices is not None and value in set(choices)
+    return choices(value).name.lower().replace("_", " ") if known and choices else str(value)
+
+
+def _last_name(spec: str) -> str:
+    """Leave out the folders of a file."""
+    return spec.rsplit("/", 1)[-1]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool) or value is None:
+        return "auto" if value is None else str(value).lower()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def transcript(manifest: Manifest, robot: Robot, batches: Iterable[Events]) -> str:
+    """Tell a run's events in plain text, a line for each thing that matters.
+
+    Args:
+        manifest: The run's.
+        robot: What moves, settled in the world.
+        batches: Its events, in order.
+    """
+    told = Transcript(manifest, robot)
+    for batch in batches:
+        told.write(batch)
+    return "\n".join(told.lines()) + "\n"

@@ -1,0 +1,1 @@
+"""Runs: plan a scenario, branch off a recorded run, reproduce one."""

@@ -1,0 +1,1 @@
+"""Collision geometry in numpy that shares no code with the planners' kernels."""

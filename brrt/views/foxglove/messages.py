@@ -1,0 +1,251 @@
+"""ROS 2 messages that Foxglove, Lichtblick and rviz draw, in CDR.
+
+The definitions are those of visualization_msgs and nav_msgs as of ROS 2 Foxy; later ones have more
+fields for textures. The file holds them, so that readers go by these.
+"""
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.views.colours import Colour
+from brrt.worlds.occupancy import Grid
+
+FRAME = "world"
+"""The only frame; without transforms, all of it stands still."""
+
+_HEADER = """
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+""".strip()
+_TIME = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
+_POSE = """
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+""".strip()
+_POINT = "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z"
+_QUATERNION = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w"
+_MARKER = """
+std_msgs/Header header
+string ns
+int32 id
+int32 type
+int32 action
+geometry_msgs/Pose pose
+geometry_msgs/Vector3 scale
+std_msgs/ColorRGBA color
+builtin_interfaces/Duration lifetime
+bool frame_locked
+geometry_msgs/Point[] points
+std_msgs/ColorRGBA[] colors
+string text
+string mesh_resource
+bool mesh_use_embedded_materials
+""".strip()
+_PARTS_OF_MARKER = (
+    _HEADER,
+    _TIME,
+    _POSE,
+    _POINT,
+    _QUATERNION,
+    "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z",
+    "MSG: std_msgs/ColorRGBA\nfloat32 r\nfloat32 g\nfloat32 b\nfloat32 a",
+    "MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec",
+)
+_GRID = """
+std_msgs/Header header
+nav_msgs/MapMetaData info
+int8[] data
+""".strip()
+_INFO = """
+MSG: nav_msgs/MapMetaData
+builtin_interfaces/Time map_load_time
+float32 resolution
+uint32 width
+uint32 height
+geometry_msgs/Pose origin
+""".strip()
+_RULE = "\n" + "=" * 80 + "\n"
+
+MARKER, MARKERS, MAP = (
+    "visualization_msgs/msg/Marker",
+    "visualization_msgs/msg/MarkerArray",
+    "nav_msgs/msg/OccupancyGrid",
+)
+DEFINITIONS = {
+    MARKER: _RULE.join([_MARKER, *_PARTS_OF_MARKER]),
+    MARKERS: _RULE.join(
+        [
+            "visualization_msgs/Marker[] markers",
+            f"MSG: visualization_msgs/Marker\n{_MARKER}",
+            *_PARTS_OF_MARKER,
+        ]
+    ),
+    MAP: _RULE.join([_GRID, _HEADER, _TIME, _INFO, _POSE, _POINT, _QUATERNION]),
+}
+"""Text of the definition of each type of message."""
+
+
+class Shape(IntEnum):
+    """What a marker is, as visualization_msgs numbers it."""
+
+    CUBE = 1
+    SPHERE = 2
+    CYLINDER = 3
+    LINE_STRIP = 4
+    LINES = 5
+    CUBES = 6
+    TEXT = 9
+    TRIANGLES = 11
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marker:
+    """Something to draw.
+
+    Attributes:
+        shape: What it is.
+        colour: Its colour.
+        scale: Its size along each axis; the first is the width of lines.
+        points: Of a list or a line, shape (n, d); in 2D they lie at height `z`.
+        place: Of anything else: where its middle is, shape (d,).
+        colours: Of each point, from 0 to 1 with alpha, shape (n, 4); `colour` for all by default.
+        text: To be written.
+        z: Height in a 2D world.
+        alpha: From 0, transparent, to 1.
+    """
+
+    shape: Shape
+    colour: Colour
+    scale: tuple[float, float, float]
+    points: NDArray[Any] | None = None
+    place: NDArray[Any] | None = None
+    colours: NDArray[np.float32] | None = None
+    text: str = ""
+    z: float = 0.0
+    alpha: float = 1.0
+
+    def message(self) -> bytes:
+        """Return the marker as a message of its own; one without points takes it away."""
+        body = _Body(_head(self._style()))
+        self._put_rest(body)
+        return bytes(body.data)
+
+    def _style(self) -> "_Style":
+        gone = self.points is not None and not len(self.points)
+        place = _space(self.place, self.z)
+        return _Style(self.shape, gone, place, self.scale, self.colour, self.alpha)
+
+    def _put_rest(self, body: "_Body") -> None:
+        """Append what differs among the many states of one drawing."""
+        points = np.empty((0, 3)) if self.points is None else self.points
+        body.rows(_heights(points, self.z), "<f8")
+        body.rows(np.empty((0, 4)) if self.colours is None else self.colours, "<f4")
+        body.text(self.text)
+        body.text("")
+        body.put("?", False)
+
+
+def array(markers: Sequence[Marker]) -> bytes:
+    """Return markers as one message."""
+    body = _Body()
+    body.put("I", len(markers))
+    for number, marker in enumerate(markers):
+        _put_style(body, marker._style(), number)  # noqa: SLF001 - its other form
+        marker._put_rest(body)  # noqa: SLF001
+    return bytes(body.data)
+
+
+def occupancy(grid: Grid, z: float) -> bytes:
+    """Return a map at a height as a message: 100 for blocked cells, 0 for free ones."""
+    body = _Body()
+    body.header()
+    body.put("iI", 0, 0)
+    rows, columns = grid.cells.shape
+    body.put("fII", grid.resolution, columns, rows)
+    body.put("7d", *grid.origin, z, 0, 0, np.sin(grid.yaw / 2), np.cos(grid.yaw / 2))
+    cells = np.where(grid.cells, np.int8(100), np.int8(0))
+    body.put("I", cells.size)
+    body.data += cells.tobytes()
+    return bytes(body.data)
+
+
+class _Style(NamedTuple):
+    """What stays the same while a drawing grows."""
+
+    shape: Shape
+    gone: bool
+    place: tuple[float, float, float]
+    scale: tuple[float, float, float]
+    colour: Colour
+    alpha: float
+
+
+class _Body:
+    """A message as it grows: each number is aligned to its own size from after the header on."""
+
+    def __init__(self, data: bytes = b"\x00\x01\x00\x00") -> None:
+        self.data = bytearray(data)
+
+    def put(self, codes: str, *values: Any) -> None:
+        """Append numbers of one size, and after them perhaps smaller ones, as struct names them."""
+        self._align(struct.calcsize(codes.lstrip("0123456789")[0]))
+        self.data += struct.pack("<" + codes, *values)
+
+    def header(self) -> None:
+        """Append a header; its stamp of 0 says that no transforms of some time are wanted."""
+        self.put("iI", 0, 0)
+        self.text(FRAME)
+
+    def text(self, text: str) -> None:
+        """Append a text."""
+        data = text.encode() + b"\0"
+        self.put("I", len(data))
+        self.data += data
+
+    def rows(self, rows: NDArray[Any], dtype: str) -> None:
+        """Append a sequence of rows of numbers."""
+        self.put("I", len(rows))
+        if len(rows):
+            self._align(np.dtype(dtype).itemsize)
+            self.data += np.ascontiguousarray(rows, dtype).tobytes()
+
+    def _align(self, size: int) -> None:
+        self.data += bytes(-(len(self.data) - 4) % size)
+
+
+@lru_cache(64)
+def _head(style: _Style) -> bytes:
+    """Return the beginning of a marker's message, up to its points."""
+    body = _Body()
+    _put_style(body, style, 0)
+    return bytes(body.data)
+
+
+def _put_style(body: _Body, style: _Style, number: int) -> None:
+    body.header()
+    body.text("")
+    body.put("iii", number, style.shape, 2 if style.gone else 0)
+    body.put("7d", *style.place, 0, 0, 0, 1)
+    body.put("3d", *style.scale)
+    body.put("4f", *(part / 255 for part in style.colour), style.alpha)
+    body.put("iI?", 0, 0, False)
+
+
+def _space(place: NDArray[Any] | None, z: float) -> tuple[float, float, float]:
+    """Return a place in 3D."""
+    x, y, *rest = (0.0, 0.0, 0.0) if place is None else place.tolist()
+    return (x, y, *rest)[:3] if rest else (x, y, z)
+
+
+def _heights(points: NDArray[Any], z: float) -> NDArray[Any]:
+    """Return points, shape (..., d), in 3D."""
+    return np.insert(points, 2, z, axis=1) if points.shape[1] == 2 else points

@@ -1,0 +1,1 @@
+"""What of a run is drawn in Rerun: trees, paths, cells, moves."""

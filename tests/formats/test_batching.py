@@ -1,0 +1,89 @@
+"""Batches that are held back: all come out again, in order, and in time."""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from brrt import Events, Kind
+from brrt.events import table_dtype
+from brrt.formats.background import Background
+from brrt.formats.batching import Gathering
+
+NOTHING = Events(0, {})
+
+
+def batch(first: int, count: int) -> Events:
+    """Events of two kinds, numbered on."""
+    tables = {}
+    numbers = np.arange(first, first + count)
+    for kind, mine in ((Kind.SAMPLE, numbers[::2]), (Kind.REJECT, numbers[1::2])):
+        if len(mine):
+            tables[kind] = np.zeros(len(mine), table_dtype(kind, 2))
+            tables[kind]["seq"] = mine
+    return Events(2, tables)
+
+
+@given(
+    arrivals=st.lists(st.tuples(st.integers(0, 9), st.integers(0, 30))),
+    enough=st.integers(1, 40),
+    patience=st.integers(0, 60),
+)
+def test_nothing_is_lost_or_late(
+    arrivals: list[tuple[int, int]], enough: int, patience: int
+) -> None:
+    """What comes out is what came in, in batches of enough events unless one has waited."""
+    now, seen = 0.0, 0
+    born: list[float] = []
+    out: list[Events] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("brrt.formats.batching.time.monotonic", lambda: now)
+        held = Gathering(2, enough, patience)
+        for count, pause in arrivals:
+            now += pause
+            born += [now] * count
+            due = held.add(batch(len(born) - count, count))
+            waiting = len(born) - seen
+            if due is not None:
+                assert len(due) == waiting
+                assert waiting >= enough or now - born[seen] >= patience
+                seen = len(born)
+                out.append(due)
+            elif waiting:
+                assert waiting < enough
+                assert now - born[seen] < patience
+    rest = held.take()
+    assert (rest is None) == (seen == len(born))
+    assert held.take() is None
+    out += [] if rest is None else [rest]
+    assert [len(each) > 0 for each in out] == [True] * len(out)
+    assert all(a.last.t <= b.last.t for a, b in pairwise(out))
+    log = Events.concat(2, out)
+    first, kinds = log.kinds_in_order()
+    assert (first, len(kinds)) == (0, len(born))
+
+
+def test_nothing_waits_for_a_planner_that_thinks() -> None:
+    """A sink in the background gets to look at the clock while no batch comes."""
+    out: list[Events] = []
+
+    class Sink:
+        held = Gathering(2, 1000, 0.3)
+
+        def write(self, events: Events) -> None:
+            due = self.held.add(events)
+            out.extend([] if due is None else [due])
+
+        def close(self, *, whole: bool) -> None:
+            assert whole
+
+    background = Background(Sink())
+    background.write(batch(0, 5))
+    end = time.monotonic() + 10
+    while not out and time.monotonic() < end:
+        time.sleep(0.01)
+    background.close(whole=True)
+    assert [len(each) for each in out] == [5]

@@ -1,0 +1,53 @@
+"""What the last messages say at any instant, against looking at every item."""
+
+from collections import Counter
+from itertools import chain
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from brrt.views.foxglove.interval_topics import tell, topics
+
+
+@st.composite
+def lives(draw: st.DrawFn) -> tuple[int, list[tuple[int, int]], int]:
+    """Draw a number of instants, lives within them, and a size of batches."""
+    instants = draw(st.integers(1, 70))
+    born = st.integers(0, instants - 1)
+    life = born.flatmap(lambda b: st.tuples(st.just(b), st.integers(b + 1, instants)))
+    return instants, draw(st.lists(life, max_size=40)), draw(st.sampled_from([1, 2, 3, 8, 16]))
+
+
+@given(lives())
+def test_last_messages_hold_what_is_there(drawn: tuple[int, list[tuple[int, int]], int]) -> None:
+    """At each instant the last message of each topic together hold each living item, once."""
+    instants, items, batch = drawn
+    born, gone = np.array(items, np.int64).reshape(-1, 2).T
+    told = list(tell(born, gone, instants, batch))
+    assert [t[:2] for t in told] == sorted({t[:2] for t in told})
+    last: dict[int, list[int]] = {}
+    for instant in range(instants):
+        while told and told[0].instant == instant:
+            message = told.pop(0)
+            assert 0 <= message.topic < topics(instants, batch)
+            # Nothing is told twice on end, and nothing is taken back that was not told.
+            assert message.items.tolist() != last.get(message.topic, [])
+            last[message.topic] = message.items.tolist()
+        there = [i for i, (b, g) in enumerate(items) if b <= instant < g]
+        assert sorted(chain.from_iterable(last.values())) == there
+        assert all(told == sorted(told) for told in last.values())
+    assert not told
+
+
+@given(lives())
+def test_each_item_is_told_rarely(drawn: tuple[int, list[tuple[int, int]], int]) -> None:
+    """An item that stays is told once a size at most, one that goes twice."""
+    instants, items, batch = drawn
+    born, gone = np.array(items, np.int64).reshape(-1, 2).T
+    count: Counter[tuple[int, int]] = Counter()
+    for message in tell(born, gone, instants, batch):
+        if message.topic:
+            count.update((message.topic, item) for item in message.items.tolist())
+    for (_, item), times in count.items():
+        assert times <= (1 if gone[item] == instants else 2)

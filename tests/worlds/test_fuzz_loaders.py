@@ -1,0 +1,37 @@
+"""Whatever is done to a world file, it is read or refused in one line."""
+
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from brrt import BrrtError
+from brrt.worlds import World, load_world
+from tests.support.world_files import GOOD, spoiled, write
+
+
+@pytest.mark.parametrize("name", GOOD)
+@settings(max_examples=150)
+@given(rng=st.randoms(use_true_random=False))
+def test_spoiled_files(name: str, rng: Random, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Bytes, words and lines changed, taken away or put in, in files of every format."""
+    folder = tmp_path_factory.getbasetemp() / "spoiled"
+    if not folder.exists():
+        folder.mkdir()
+        write(folder)
+    path = Path(folder, f"{Path(name).stem}.spoiled{Path(name).suffix}")
+    path.write_bytes(spoiled((folder / name).read_bytes(), rng))
+    query = "0" if name.startswith(("grid.scen", "circle_queries")) else ""
+    try:
+        world = load_world(
+            path, {"obstacles": "circle_obstacles.txt"} if "queries" in name else {}, query
+        )
+    except BrrtError as error:
+        message = str(error)
+        assert message.startswith(str(path))
+        assert message.isprintable()
+        assert len(message) < len(str(path)) * 2 + 400
+    else:
+        assert isinstance(world, World)
