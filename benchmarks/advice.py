@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from brrt import BranchedRun, Memory, Recording, Run, Scenario, World
+from brrt import BranchedRun, Memory, Recording, Run, Scenario, World, snapshot
 from brrt.explanation import Advice, explain
 
 SEEDS = 10
@@ -113,7 +113,7 @@ def lines(case: str) -> Iterator[str]:
         scenario = Scenario(seed=seed, **values)
         figures, recording = run(Run(scenario, world=world))
         before.append(figures)
-        for advice in explain(recording.at()).advice:
+        for advice in explain(snapshot(recording)).advice:
             after[_changes(scenario, advice)].append((figures, recording, advice))
     yield told(case, before)
     for changes, given in after.items():

@@ -47,7 +47,7 @@ def drawn(run: Run, batches: list[Events], path: Path) -> None:
     sink = RerunSink(run.manifest, run.problem.world, path=path)
     for batch in batches:
         sink.write(batch)
-    sink.close(whole=True)
+    sink.close({})
 
 
 def bare(run: Run, batches: list[Events], path: Path) -> None:

@@ -39,6 +39,7 @@ from mcap.reader import make_reader
 from brrt import BrrtError, Events, McapSink, Run, Scenario, first_difference, read
 from brrt.formats.background import Background
 from brrt.formats.recover import recover
+from brrt.replay.metrics import Metrics
 from brrt.views.rerun.sink import RerunSink
 
 NAMES = ("run.mcap", "run.rrd")
@@ -65,13 +66,15 @@ def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
     ]
     handed = os.open(folder / "handed", os.O_WRONLY | os.O_CREAT)
     count = 0
+    metrics = Metrics(run.manifest)
     for events in run.events():
+        metrics.write(events)
         for sink in sinks:
             sink.write(events)
         count += len(events)
         os.pwrite(handed, f"{count} {events.last.t}\n".encode(), 0)
     for sink in sinks:
-        sink.close(whole=True)
+        sink.close(metrics.as_dict())
     os.close(handed)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from brrt import Events, Kind, Run, Scenario, World, make_world
 from brrt.planners.base.stop import Stop
+from brrt.recording import Result
 
 OBSTACLES = (100, 1_000, 10_000, 100_000)
 COVERED = 0.1
@@ -36,7 +37,7 @@ class Pace:
         self.rows.append((self._nodes, events.last.iteration, events.last.t))
         self._stop.interrupted = self._nodes >= self._marks[-1]
 
-    def close(self, *, whole: bool) -> None:
+    def close(self, result: Result | None) -> None:
         """Nothing to release."""
 
 

@@ -28,8 +28,9 @@ from typing import Any
 
 import numpy as np
 
-from brrt import Events, Kind, McapSink, Run, Scenario, World, read
+from brrt import Events, Kind, McapSink, Run, Scenario, World, check, read
 from brrt.formats.background import Background
+from brrt.recording import Result
 
 PEER = Path(__file__).with_name("ompl_peer.cpp")
 
@@ -184,7 +185,7 @@ class Paths:
             times = ((table["t"] - self._began) / 1e9).tolist()
             self.found += zip(times, table["cost"].tolist(), strict=True)
 
-    def close(self, *, whole: bool) -> None:
+    def close(self, result: Result | None) -> None:
         """Nothing to release."""
 
     def cost_at(self, seconds: float) -> float:
@@ -272,7 +273,8 @@ def valid(bench: Bench, cases: list[Case]) -> None:
         ours = 0
         for seed in seeds:
             bench.ours(case, seed, "rrt")
-            ours += not read(bench.folder / "run.mcap").check()
+            recording = read(bench.folder / "run.mcap")
+            ours += not check(recording.manifest, recording.world, recording.events())
         print(f"{case.name:44}{theirs:7}/{len(seeds)}{ours:7}/{len(seeds)}", flush=True)
 
 

@@ -17,11 +17,13 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from brrt.events import Events, Kind
-from brrt.formats import McapSink, Memory, read_mcap
+from brrt.formats import McapSink, read_mcap
 from brrt.formats.background import Background
 from brrt.formats.mcap.cdr import definition
 from brrt.formats.mcap.writer import channel_of
-from brrt.runs.run import Run, Sink
+from brrt.recording import Memory, Sink
+from brrt.replay.metrics import metrics
+from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 
 # An obstacle field that the step cannot pass, so that the run makes the events it is asked for.
@@ -69,7 +71,7 @@ def encoded(run: Run, batches: list[Events]) -> list[tuple[int, int, int, bytes]
         sink = McapSink(path, run.manifest, run.problem.world)
         for batch in batches:
             sink.write(batch)
-        sink.close(whole=True)
+        sink.close({})
         with path.open("rb") as file:
             return [
                 (channel.id, message.log_time, message.sequence, message.data)
@@ -115,7 +117,7 @@ def measure(folder: Path, events: int, repeats: int, *, rerun: bool) -> None:
         sink = McapSink(folder / "ours.mcap", run.manifest, run.problem.world)
         for batch in memory.batches:
             sink.write(batch)
-        sink.close(whole=True)
+        sink.close(memory.result)
 
     write_ratios, read_ratios, stock_us = [], [], []
     for _ in range(repeats):
@@ -124,7 +126,7 @@ def measure(folder: Path, events: int, repeats: int, *, rerun: bool) -> None:
         mine = timed(ours)
         write_ratios.append(stock / mine)
         stock_read = timed(lambda: count_messages(folder / "ours.mcap"))
-        my_read = timed(lambda: read_mcap(folder / "ours.mcap").metrics())
+        my_read = timed(lambda: metrics(read_mcap(folder / "ours.mcap")))
         read_ratios.append(stock_read / my_read)
         rates = (count / stock, count / mine, count / stock_read, count / my_read)
         print("  events a second: stock write %.0f, ours %.0f; stock read %.0f, ours %.0f" % rates)

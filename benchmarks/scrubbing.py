@@ -34,7 +34,7 @@ def grown(planner: str, edges: int, path: Path) -> tuple[int, int]:
         nodes, events = nodes + batch.counts.get(Kind.EDGE, 0), events + len(batch)
         if nodes > edges:
             break
-    sink.close(whole=True)
+    sink.close(None)
     return nodes - 1, events
 
 

@@ -2,80 +2,79 @@
 
 import brrt
 
-run = brrt.Run(brrt.Scenario(world="circles2d:n=80", seed=7))
-log = brrt.Memory()
-metrics = run.execute([log])
-tree = brrt.forest(log.events())[0]
+recording = brrt.Run(brrt.Scenario(world="circles2d:n=80", seed=7)).record()
+tree = brrt.snapshot(recording).forest[0]
 
-PYTEST_DONT_REWRITE: whoever imports brrt ahead of pytest is not to be warned, as pytest warns of
-packages that bring a plugin.
+PYTEST_DONT_REWRITE: pytest would warn that it cannot rewrite brrt, which is imported before it.
 """
 
-from brrt.comparison.comparison import Comparison
-from brrt.comparison.events import Difference, first_difference
-from brrt.comparison.versus import compare
-from brrt.errors import BrrtError, RecordingError
-from brrt.events import Events, Kind
-from brrt.explanation import Explanation, explain
-from brrt.formats import McapSink, Memory, Recording, read
-from brrt.planners import PLANNERS, RRT, Planner
-from brrt.planners.base.problem import Problem
-from brrt.replay.forest import Tree, forest
-from brrt.replay.metrics import Metrics
-from brrt.replay.snapshot import Snapshot
-from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot
-from brrt.runs.branched import BranchedRun, RepeatedRun
-from brrt.runs.reproduce import Again, plan_again
-from brrt.runs.run import Run, Sink
-from brrt.scenario.manifest import Manifest
-from brrt.scenario.scenario import Scenario
-from brrt.testing.gate import Verdict, gate
-from brrt.verification import Finding, check
-from brrt.worlds import GENERATORS, Grid, World, make_world
+from importlib import import_module
+from typing import Any
 
-__all__ = [
-    "GENERATORS",
-    "PLANNERS",
-    "ROBOTS",
-    "RRT",
-    "Again",
-    "BranchedRun",
-    "BrrtError",
-    "Chain",
-    "Comparison",
-    "Difference",
-    "Events",
-    "Explanation",
-    "Finding",
-    "Grid",
-    "Kind",
-    "Manifest",
-    "McapSink",
-    "Memory",
-    "Metrics",
-    "Planner",
-    "Point",
-    "Polygon",
-    "Problem",
-    "Recording",
-    "RecordingError",
-    "RepeatedRun",
-    "Robot",
-    "Run",
-    "Scenario",
-    "Sink",
-    "Snapshot",
-    "Tree",
-    "Verdict",
-    "World",
-    "check",
-    "compare",
-    "explain",
-    "first_difference",
-    "forest",
-    "gate",
-    "make_robot",
-    "make_world",
-    "plan_again",
-    "read",
-]
+_MODULES = {
+    "BrrtError": "errors",
+    "RecordingError": "errors",
+    "Events": "events",
+    "Kind": "events",
+    "Memory": "recording",
+    "Recording": "recording",
+    "Sink": "recording",
+    "Chain": "robots",
+    "Point": "robots",
+    "Polygon": "robots",
+    "ROBOTS": "robots",
+    "Robot": "robots",
+    "make_robot": "robots",
+    "GENERATORS": "worlds",
+    "Grid": "worlds",
+    "World": "worlds",
+    "make_world": "worlds",
+    "Manifest": "scenario.manifest",
+    "Scenario": "scenario.scenario",
+    "PLANNERS": "planners",
+    "Planner": "planners",
+    "RRT": "planners",
+    "Problem": "planners.base.problem",
+    "Run": "runs.run",
+    "BranchedRun": "runs.branched",
+    "RepeatedRun": "runs.branched",
+    "Again": "runs.reproduce",
+    "plan_again": "runs.reproduce",
+    "McapSink": "formats",
+    "read": "formats",
+    "Metrics": "replay.metrics",
+    "metrics": "replay.metrics",
+    "Snapshot": "replay.snapshot",
+    "snapshot": "replay.snapshot",
+    "Tree": "replay.forest",
+    "forest": "replay.forest",
+    "transcript": "replay.transcript",
+    "Comparison": "comparison.comparison",
+    "Difference": "comparison.events",
+    "first_difference": "comparison.events",
+    "compare": "comparison.versus",
+    "Finding": "verification",
+    "check": "verification",
+    "Explanation": "explanation",
+    "explain": "explanation",
+    "plot": "views.matplotlib.figure",
+    "show": "views.rerun.notebook",
+    "Verdict": "testing.gate",
+    "gate": "testing.gate",
+}
+"""The module that each public name is imported from when it is first used: `import brrt` is fast,
+and reading a recording never imports a planner. `__init__.pyi` says the same to type checkers."""
+
+__all__ = list(_MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'brrt' has no attribute {name!r}")
+    value = getattr(import_module(f"brrt.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

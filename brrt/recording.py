@@ -1,138 +1,160 @@
-"""A recording that was read: the manifest, the world, and the events in order."""
+"""A run as plain data, and where its events go: `Recording`, `Sink` and `Memory`."""
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from numbers import Real
+from typing import Any, Protocol
 
+from brrt.errors import BrrtError, unknown
 from brrt.events import Events, Kind
-from brrt.replay.metrics import Metrics
-from brrt.replay.snapshot import Snapshot, check_limits, instant
-from brrt.replay.transcript import transcript
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
-from brrt.verification import Finding, check
 from brrt.worlds.world import World
+
+Result = Mapping[str, Any]
+"""The metrics of a whole run, under the names that `--json` prints."""
+
+Limits = Mapping[str, int]
+"""An instant, as `Events.until` takes it; the end of the run where it is empty."""
+
+
+class Sink(Protocol):
+    """Where the events of a run go."""
+
+    def write(self, events: Events) -> None:
+        """Take a batch; an empty one asks the sink to write what it has buffered for too long."""
+
+    def close(self, result: Result | None) -> None:
+        """Release everything.
+
+        Args:
+            result: The run's metrics; None if the run did not come to its own end.
+        """
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Recording:
-    """A recording on disk; its events are read anew by each call of `batches`.
+    """A run that was recorded, in a file or in memory.
 
     Attributes:
-        manifest: What the run was.
-        world: The world it ran in.
-        batches: Call it for the events, in batches, in order.
-        result: The figures that the writer found at the end; None if it did not get there.
-        counts: Events of each kind, as the end of the file has them; None if it does not.
-        name: Of the file, without its folder.
+        manifest: What was run.
+        world: The world that it ran in.
+        batches: Returns the events in batches, in order; each call reads them anew.
+        result: The metrics that the writer stored at the end; None if the run's end is missing.
+        counts: Events of each kind, as the end of the file states them; None if it does not.
+        name: Name of the file without its folder; empty for a run in memory.
     """
 
     manifest: Manifest
     world: World
-    batches: Callable[[], Iterator[Events]]
-    result: Mapping[str, Any] | None
+    batches: Callable[[], Iterable[Events]]
+    result: Result | None = None
     counts: Mapping[Kind, int] | None = None
     name: str = ""
 
     def __repr__(self) -> str:
         scenario, result = self.manifest.scenario, self.result
-        end = "no figures at its end"
+        end = "the run's end is missing"
         if result is not None:
             end = f"{result.get('events')} events, {result.get('status')}"
         run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"
         return f"<Recording {self.name or 'in memory'}: {run}; {end}>"
 
     def events(self) -> Events:
-        """Return the whole log at once."""
+        """Return all events as one batch."""
         return Events.concat(self.manifest.dof, self.batches())
 
-    def at(
-        self,
-        *,
-        time: float | None = None,
-        event: int | None = None,
-        iteration: int | None = None,
-    ) -> Snapshot:
-        """Return the run as it stood at an instant, as `brrt replay --at` has it; or at its end.
-
-        Nothing is read until something of it is asked for, and then no further than the instant.
-
-        Args:
-            time: Seconds since the run began.
-            event: After this event.
-            iteration: After this iteration.
-
-        Raises:
-            BrrtError: More than one is given, or it is no number from 0 on.
-        """
-        limits = instant(time=time, event=event, iteration=iteration)
-        return Snapshot(self.manifest, self.world, self.batches, limits, self.name)
-
     def robot(self) -> Robot:
-        """Make the robot as it was, settled in the world."""
+        """Return the robot of the run, with all its settings resolved in the world."""
         return self.manifest.make_robot().resolved(self.world)
 
-    def text(self) -> str:
-        """Tell the run in plain text, without times: the same on every machine."""
-        return transcript(self.manifest, self.robot(), self.batches())
 
-    def show(self, *, width: int = 1200, height: int = 700) -> Any:
-        """Show the run in a notebook: the cell's last value, or `display` of it.
+class Memory:
+    """A sink that keeps every batch.
 
-        Args:
-            width: Of the viewer, in pixels.
-            height: Of the viewer.
+    Attributes:
+        batches: The batches so far.
+        result: The metrics, once the run has come to its own end.
+    """
 
-        Returns:
-            Rerun's viewer where rerun-notebook is installed, and otherwise a figure of matplotlib.
+    def __init__(self) -> None:
+        self.batches: list[Events] = []
+        self.result: Result | None = None
 
-        Raises:
-            BrrtError: Neither is installed.
-        """
-        try:
-            import rerun_notebook  # noqa: F401, PLC0415 - an extra that brings much of Jupyter
-        except ImportError:
-            return self.plot().figure
-        from rerun.notebook import Viewer  # noqa: PLC0415 - costs half a second
+    def write(self, events: Events) -> None:
+        """Keep a batch."""
+        self.batches.append(events)
 
-        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - stands above this file
+    def close(self, result: Result | None) -> None:
+        """Keep the metrics."""
+        self.result = result
 
-        viewer = Viewer(width=width, height=height, use_global_recording=False)
-        sink = RerunSink(self.manifest, self.world, embed=viewer)
-        for batch in self.batches():
-            sink.write(batch)
-        sink.close(whole=self.result is not None)
-        return viewer
-
-    def metrics(self) -> Metrics:
-        """Fold the events into the run's figures."""
-        metrics = Metrics(self.manifest)
-        for batch in self.batches():
-            metrics.write(batch)
-        return metrics
-
-    def plot(
-        self, ax: Any = None, *, what: str = "tree", rejects: int = 0, **until: int | None
-    ) -> Any:
-        """Draw the run by matplotlib into axes, new ones by default; return the axes.
-
-        Args:
-            ax: Axes, with projection "3d" for the tree in a world in 3D.
-            what: "tree", or "cost" for that of the best path.
-            rejects: How many of the newest rejected extensions are drawn.
-            until: The instant, as `Events.until` takes it; the end by default.
+    def events(self) -> Events:
+        """Return all events as one batch.
 
         Raises:
-            BrrtError: matplotlib is missing, the axes are of no use, or there is no path.
+            ValueError: Nothing was written.
         """
-        from brrt.views.matplotlib.figure import plot  # noqa: PLC0415 - matplotlib is an extra
-        from brrt.views.matplotlib.history import Record  # noqa: PLC0415
+        if not self.batches:
+            raise ValueError("nothing has been recorded")
+        return Events.concat(self.batches[0].dof, self.batches)
 
-        check_limits(until, "ax", "what", "rejects")
-        events = self.events().until(**until)
-        record = Record(self.manifest.scenario.planner, self.manifest, self.world, events)
-        return plot(record, ax, what=what, rejects=rejects)
+    def recording(self, manifest: Manifest, world: World, name: str = "") -> Recording:
+        """Return what was kept as a recording of the run with this manifest and world."""
+        return Recording(manifest, world, lambda: self.batches, self.result, name=name)
 
-    def check(self) -> list[Finding]:
-        """Hold the run to what its planner promises; return what it breaks."""
-        return check(self.manifest, self.world, self.events(), figures=self.result)
+
+_COLUMNS = ("iteration", "seq", "t")
+_LONGEST_S = 9e9
+"""Longer than any run, in seconds; its nanoseconds fit into 64 bits. More than any count, too."""
+
+
+def instant(
+    *, time: float | None = None, event: int | None = None, iteration: int | None = None
+) -> dict[str, int]:
+    """Return an instant as `Events.until` takes it; empty, the run's end, if none is given.
+
+    Args:
+        time: Seconds since the run began.
+        event: Number of the last event.
+        iteration: The last iteration.
+
+    Raises:
+        BrrtError: More than one is given, or a value is not a number from 0 on.
+    """
+    given: dict[str, Any] = {"time": time, "event": event, "iteration": iteration}
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if len(chosen) > 1:
+        raise BrrtError(f"give one of time, event and iteration, not {' and '.join(chosen)}")
+    for name, value in chosen.items():
+        whole = name == "time" or (_counts(value) and value == int(value))
+        if not (_counts(value) and value < _LONGEST_S and whole):
+            what = "seconds from 0 on" if name == "time" else "a whole number from 0 on"
+            raise BrrtError(f"{name} must be {what}, not {value!r:.60}")
+    if time is not None:
+        return {"t": round(time * 1e9)}
+    return {"seq" if name == "event" else name: int(value) for name, value in chosen.items()}
+
+
+def check_limits(limits: Mapping[str, Any], *others: str) -> None:
+    """Check that keyword arguments are an instant as `Events.until` takes it.
+
+    Args:
+        limits: The keyword arguments.
+        others: Names of the other arguments of the function, for the message.
+
+    Raises:
+        BrrtError: A name is unknown, or a value is not a whole number from 0 on.
+    """
+    for name, value in limits.items():
+        if name not in _COLUMNS:
+            raise unknown("argument", name, (*others, *_COLUMNS))
+        if value is not None and not (_counts(value) and value == int(value)):
+            raise BrrtError(f"{name} must be a whole number from 0 on, not {value!r:.60}")
+
+
+def _counts(value: Any) -> bool:
+    """Whether a value is a finite number from 0 on."""
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    return number and bool(0 <= value < math.inf)

@@ -9,7 +9,7 @@ from .console import Code, print_json, print_lines
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.formats import Recording
+    from brrt.recording import Recording
 
 
 def diff(

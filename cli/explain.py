@@ -34,13 +34,15 @@ def explain(
 
     brrt explain run.mcap --json
     """
+    from dataclasses import replace  # noqa: PLC0415
+
     from brrt.explanation import explain as explained  # noqa: PLC0415
     from brrt.replay.snapshot import Snapshot  # noqa: PLC0415
 
     limits = instant(at, at_event, at_iteration)
     recording = opened(run, partial=partial)
     batches = Counted(Saved(recording, partial=partial, verb="explain them"))
-    moment = Snapshot(recording.manifest, recording.world, lambda: iter(batches), limits)
+    moment = Snapshot(replace(recording, batches=lambda: iter(batches)), limits)
     found = explained(moment, str(run))
     late = beyond(limits, batches.count, batches.last)
     if late is not None:

@@ -31,15 +31,15 @@ def instant(at: str | None, event: int | None, iteration: int | None) -> dict[st
     Raises:
         BrrtError: It is no time, lies before the start, or more than one is given.
     """
+    from brrt import recording  # noqa: PLC0415
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.replay import snapshot  # noqa: PLC0415
 
     if sum(value is not None for value in (at, event, iteration)) > 1:
         raise BrrtError("give one of --at, --at-event and --at-iteration")
     if any(value is not None and value < 0 for value in (event, iteration)):
         raise BrrtError("--at-event and --at-iteration count from 0")
     time = None if at is None else _seconds(at)
-    return snapshot.instant(time=time, event=event, iteration=iteration)
+    return recording.instant(time=time, event=event, iteration=iteration)
 
 
 def beyond(limits: dict[str, int], count: int, last: "Instant") -> str | None:

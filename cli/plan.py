@@ -15,8 +15,9 @@ from .instants import At, AtEvent, AtIteration, instant
 from .numbers import whole_number
 
 if TYPE_CHECKING:
+    from brrt.recording import Sink
     from brrt.replay.metrics import Metrics
-    from brrt.runs.run import Run, Sink
+    from brrt.runs.run import Run
     from brrt.scenario.scenario import Scenario
 
 

@@ -164,7 +164,7 @@ def _panels(what: str | None) -> list[str]:
 def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "list[Record]":
     """Read the runs, up to the instant asked for; those of one name are told apart by folder."""
     from brrt.events import Events  # noqa: PLC0415
-    from brrt.formats import Memory  # noqa: PLC0415
+    from brrt.recording import Memory  # noqa: PLC0415
     from brrt.replay.snapshot import feed  # noqa: PLC0415
     from brrt.views.matplotlib.history import Record  # noqa: PLC0415
 

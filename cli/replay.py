@@ -14,7 +14,7 @@ from .saved import Saved, opened
 if TYPE_CHECKING:
     from brrt.comparison.events import Difference
     from brrt.events import Instant
-    from brrt.formats import Recording
+    from brrt.recording import Recording
     from brrt.replay.tree_stats import TreeFigures
 
 _VERB = "replay them"
@@ -159,7 +159,7 @@ def _draw(recording: "Recording", rrd: Path, limits: dict[str, int], *, partial:
     try:
         feed(Saved(recording, partial=partial, verb=_VERB), [sink], limits)
     finally:
-        sink.close(whole=recording.result is not None and not limits)
+        sink.close(None if limits else recording.result)
 
 
 def _tell_of(
@@ -171,10 +171,12 @@ def _tell_of(
     partial: bool,
     as_json: bool,
 ) -> None:
+    from dataclasses import replace  # noqa: PLC0415
+
     from brrt.replay.snapshot import Snapshot  # noqa: PLC0415
 
     batches = Counted(Saved(recording, partial=partial, verb=_VERB))
-    moment = Snapshot(recording.manifest, recording.world, lambda: iter(batches), limits)
+    moment = Snapshot(replace(recording, batches=lambda: iter(batches)), limits)
     show_node(moment, node, tree, as_json=as_json)
     _note_end(limits, batches.count, batches.last)
 

@@ -11,7 +11,7 @@ from .console import counted, note
 
 if TYPE_CHECKING:
     from brrt.events import Events
-    from brrt.formats import Recording
+    from brrt.recording import Recording
 
 
 def naming_runs(command: Callable[..., None]) -> Callable[..., None]:

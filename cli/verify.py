@@ -11,7 +11,7 @@ from .console import Code, Watch, note, out, print_json, print_lines, tell_of_co
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.formats import Recording
+    from brrt.recording import Recording
     from brrt.runs.reproduce import Again
     from brrt.verification import RuleResult
 

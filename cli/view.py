@@ -14,7 +14,7 @@ from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.events import Events
-    from brrt.formats import Recording
+    from brrt.recording import Recording
     from brrt.views.viewer.control import Cursor
 
 _TIMELINES = {"t": "t", "seq": "event", "iteration": "iteration"}
@@ -213,7 +213,7 @@ def _draw(recording: "Recording", log: "list[Events]", file: Path, watch: Watch)
             done += len(batch)
             watch.update(done, "drawing", f"{done:,} of {total:,} events")
     finally:
-        sink.close(whole=recording.result is not None)
+        sink.close(recording.result)
 
 
 def _prepare_pair(

@@ -13,7 +13,7 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-from brrt import BrrtError, first_difference, read
+from brrt import BrrtError, first_difference, read, transcript
 
 FOLDER = Path(__file__).parent
 
@@ -53,7 +53,7 @@ def compare(name: str, fresh: Path) -> str | None:
         return f"{found} (golden against fresh)"
     account = kept.with_suffix(".txt")
     told = account.read_text("utf-8") if account.exists() else ""
-    return None if told == read(fresh).text() else f"is not what {account.name} tells"
+    return None if told == transcript(read(fresh)) else f"is not what {account.name} tells"
 
 
 def main() -> int:
@@ -79,7 +79,7 @@ def main() -> int:
             changed += difference is not None
             if difference is not None and options.action == "update":
                 (FOLDER / fresh.name).write_bytes(fresh.read_bytes())
-                (FOLDER / f"{name}.txt").write_text(read(fresh).text(), "utf-8")
+                (FOLDER / f"{name}.txt").write_text(transcript(read(fresh)), "utf-8")
     wrong = strays() if options.action == "check" or not options.names else []
     print("\n".join(wrong), end="\n" if wrong else "")
     return 1 if changed or wrong else 0

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from brrt import Events, Memory, Run, Scenario
+from brrt import Events, Manifest, Memory, Metrics, Run, Scenario
 
 pytest_plugins = ["pytester"]
 
@@ -83,6 +83,14 @@ def _recorded(scenario: str, batch: int) -> tuple[Run, Events]:
     run, memory = Run(Scenario.parse(json.loads(scenario)), batch=batch), Memory()
     run.execute([memory])
     return run, memory.events()
+
+
+def result_of(manifest: Manifest, *batches: Events) -> dict[str, Any]:
+    """Fold events into the result that a sink is closed with."""
+    found = Metrics(manifest)
+    for batch in batches:
+        found.write(batch)
+    return found.as_dict()
 
 
 def recorded(scenario: Scenario, *, batch: int = 16384) -> tuple[Run, Events]:

@@ -8,8 +8,7 @@ from brrt.comparison.comparison import Comparison, Side, compare_sides
 from brrt.errors import BrrtError
 from brrt.events import Events
 from brrt.formats import read
-from brrt.formats.memory import Memory
-from brrt.recording import Recording
+from brrt.recording import Memory, Recording
 from brrt.runs.run import Run
 from brrt.scenario.manifest import Manifest
 from brrt.worlds.world import World

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any, Protocol
+from typing import Any
 
 from brrt.errors import BrrtError
 from brrt.explanation.advice import advise
@@ -10,6 +10,7 @@ from brrt.explanation.commands import Advice
 from brrt.explanation.facts import Facts, facts
 from brrt.explanation.gather import Gather
 from brrt.explanation.report import Row, rows, table
+from brrt.recording import Recording
 from brrt.replay.snapshot import Snapshot
 
 
@@ -45,40 +46,28 @@ class Explanation:
         return {**self.facts.as_dict(), "advice": [each.as_dict() for each in self.advice]}
 
 
-class _Recorded(Protocol):
-    """A recording, as `brrt.read` returns it."""
-
-    def at(self) -> Snapshot:
-        """Return the run at its end."""
-
-
-def explain(run: Snapshot | _Recorded, file: str = "") -> Explanation:
-    """Explain a run as it stood at an instant, in one pass over its events.
+def explain(run: Recording | Snapshot, file: str = "") -> Explanation:
+    """Explain a run, in one pass over its events.
 
     Args:
-        run: The run at an instant, or a recording: the run at its end.
-        file: The recording, as commands that are advised name it; by default its own name.
+        run: The run, or a snapshot of it.
+        file: The recording's file as the commands of the advice name it; its name by default.
 
     Raises:
-        BrrtError: `run` is the path of a recording, or something else; or the manifest's query is
-            of no use in its world.
+        BrrtError: `run` is neither, or the manifest does not fit its world.
     """
-    moment = run if isinstance(run, Snapshot) else _end(run)
-    robot = moment.manifest.make_robot().resolved(moment.world)
-    gather = Gather(moment.manifest, robot)
-    moment.feed(gather)
-    found = facts(moment, file or moment.name, robot, gather)
-    return Explanation(found, advise(found))
-
-
-def _end(run: _Recorded) -> Snapshot:
     if isinstance(run, str | PathLike):
         raise BrrtError(
             f"explain takes a recording, not its path: brrt.explain(brrt.read({str(run)!r}))"
         )
-    if not hasattr(run, "at"):
-        raise BrrtError(f"explain takes a recording or a moment of one, not {run!r:.60}")
-    return run.at()
+    if not isinstance(run, Recording | Snapshot):
+        raise BrrtError(f"explain takes a recording or a snapshot of one, not {run!r:.60}")
+    moment = run if isinstance(run, Snapshot) else Snapshot(run)
+    robot = moment.recording.robot()
+    gather = Gather(moment.recording.manifest, robot)
+    moment.feed(gather)
+    found = facts(moment, file or moment.recording.name, robot, gather)
+    return Explanation(found, advise(found))
 
 
 __all__ = ["Advice", "Explanation", "Facts", "explain"]

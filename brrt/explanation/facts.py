@@ -197,7 +197,7 @@ def facts(moment: Snapshot, file: str, robot: Robot, gather: Gather) -> Facts:
         robot: What moves, settled in the world.
         gather: What the log says.
     """
-    manifest, world = moment.manifest, moment.world
+    manifest, world = moment.recording.manifest, moment.recording.world
     places = Places(world, robot, gather)
     start, goal = np.array(manifest.start), np.array(manifest.goal)
     figures = gather.metrics.as_dict()

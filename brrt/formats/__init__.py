@@ -1,6 +1,6 @@
 """Recordings: sinks that write them, and `read` for what they wrote."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial as bound
@@ -13,7 +13,6 @@ from brrt.formats.integrity import BrokenError, CutError, DamagedError
 from brrt.formats.mcap.container import MAGIC
 from brrt.formats.mcap.reader import is_whole, read_mcap
 from brrt.formats.mcap.writer import McapSink
-from brrt.formats.memory import Memory
 from brrt.recording import Recording
 
 _RRD = b"RRF"
@@ -45,7 +44,7 @@ def _is_whole(path: Path) -> bool:
         return file.read(len(_RRD)) == _RRD or is_whole(path)
 
 
-def _whole_part(batches: Callable[[], Iterator[Events]]) -> Iterator[Events]:
+def _whole_part(batches: Callable[[], Iterable[Events]]) -> Iterator[Events]:
     """Yield the events that stand ahead of a cut or of damage."""
     with suppress(BrokenError):
         yield from batches()
@@ -79,7 +78,6 @@ __all__ = [
     "CutError",
     "DamagedError",
     "McapSink",
-    "Memory",
     "Recording",
     "read",
     "read_mcap",

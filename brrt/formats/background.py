@@ -4,7 +4,7 @@ import queue
 import threading
 
 from brrt.events import Events
-from brrt.runs.run import Sink
+from brrt.recording import Result, Sink
 
 _BATCHES = 24
 """Batches in waiting, half a megabyte each: so far a planner may be ahead before it waits."""
@@ -37,16 +37,16 @@ class Background:
         self._raise()
         self._queue.put(events)
 
-    def close(self, *, whole: bool) -> None:
+    def close(self, result: Result | None) -> None:
         """Wait for what is queued, then close the sink."""
         self._queue.put(None)
         self._thread.join()
         try:
             self._raise()
         except BaseException:
-            self._sink.close(whole=False)
+            self._sink.close(None)
             raise
-        self._sink.close(whole=whole)
+        self._sink.close(result)
 
     def _work(self) -> None:
         while (events := self._next()) is not None:

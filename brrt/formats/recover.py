@@ -10,6 +10,7 @@ from brrt.formats import read
 from brrt.formats.integrity import BrokenError
 from brrt.formats.mcap.writer import McapSink
 from brrt.recording import Recording
+from brrt.replay.metrics import Metrics
 
 NOTE = "brrt.recovered"
 """Name of what a recovered file says of its origin."""
@@ -63,15 +64,15 @@ def recover(cut: Path | str, whole: Path | str) -> Recovery:
 
 def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
     """Write what is sound of a recording to a path."""
-    sink = _sink(path, recording)
+    sink, metrics = _sink(path, recording), Metrics(recording.manifest)
     try:
-        recovery = _copy(recording, sink)
+        recovery = _copy(recording, sink, metrics)
         if recovery.lost is not None:
             sink.annotate(NOTE, _note(cut, recovery))
     except BaseException:
-        sink.close(whole=False)
+        sink.close(None)
         raise
-    sink.close(whole=recovery.ended)
+    sink.close(metrics.as_dict() if recovery.ended else None)
     return recovery
 
 
@@ -83,10 +84,10 @@ def _sink(path: Path, recording: Recording) -> Any:
     return McapSink(path, recording.manifest, recording.world)
 
 
-def _copy(recording: Recording, sink: Any) -> Recovery:
+def _copy(recording: Recording, sink: Any, metrics: Metrics) -> Recovery:
     """Hand a sink the events as far as they are sound."""
     count, last = 0, 0
-    batches = recording.batches()
+    batches = iter(recording.batches())
     while True:
         try:
             batch = next(batches, None)
@@ -95,6 +96,7 @@ def _copy(recording: Recording, sink: Any) -> Recovery:
         if batch is None:
             return Recovery(count, last / 1e9, None, True, recording.result is not None)
         sink.write(batch)
+        metrics.write(batch)
         count, last = count + len(batch), max(last, batch.last.t)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
+from brrt.recording import Recording
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
 
@@ -76,9 +77,6 @@ class Metrics:
         self._raw = path
         if self._first is None:
             self._first = Instant(int(event["t"]), int(event["iteration"])), path[0]
-
-    def close(self, *, whole: bool = True) -> None:
-        """Nothing to release."""
 
     @property
     def solved(self) -> bool:
@@ -218,3 +216,11 @@ class _Moves:
 def _finite(value: float | None) -> float | None:
     """Keep JSON valid: it has no infinity."""
     return value if value is not None and math.isfinite(value) else None
+
+
+def metrics(recording: Recording) -> Metrics:
+    """Fold the events of a run into its metrics."""
+    found = Metrics(recording.manifest)
+    for batch in recording.batches():
+        found.write(batch)
+    return found

@@ -1,21 +1,18 @@
-"""A run as it stood at an instant: trees, figures, paths, nodes, each folded when asked for."""
+"""A run at an instant: trees, metrics, paths, nodes, each folded when it is asked for."""
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Real
-from typing import Any, Protocol
+from typing import Protocol
 
-from brrt.errors import BrrtError, unknown
+from brrt.errors import BrrtError
 from brrt.events import Events, Instant, Kind
+from brrt.recording import Limits, Memory, Recording, instant
 from brrt.replay.cell_history import CellHistory, CellTrace
 from brrt.replay.forest import Tree, forest
 from brrt.replay.history_records import NodeHistory
 from brrt.replay.metrics import Metrics, Path
 from brrt.replay.node_history import NodeTrace
-from brrt.scenario.manifest import Manifest
-from brrt.worlds.world import World
 
 
 class Fold(Protocol):
@@ -26,7 +23,7 @@ class Fold(Protocol):
 
 
 def feed(
-    batches: Iterable[Events], folds: Iterable[Fold], limits: Mapping[str, int]
+    batches: Iterable[Events], folds: Iterable[Fold], limits: Limits
 ) -> tuple[int, Instant] | None:
     """Hand the events up to the limits to the folds; read no batch beyond the one that has them.
 
@@ -50,176 +47,119 @@ def feed(
     return count, last
 
 
-def instant(
-    *, time: float | None = None, event: int | None = None, iteration: int | None = None
-) -> dict[str, int]:
-    """Return an instant as `Events.until` takes it; empty, the end of the run, if none is given.
-
-    Args:
-        time: Seconds since the run began.
-        event: Number of the last event.
-        iteration: The last iteration.
-
-    Raises:
-        BrrtError: More than one is given, or it is no number from 0 on.
-    """
-    given: dict[str, Any] = {"time": time, "event": event, "iteration": iteration}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if len(chosen) > 1:
-        raise BrrtError(f"give one of time, event and iteration, not {' and '.join(chosen)}")
-    for name, value in chosen.items():
-        if not _counts(value) or not value < _FOREVER or (name != "time" and value != int(value)):
-            what = "seconds from 0 on" if name == "time" else "a whole number from 0 on"
-            raise BrrtError(f"{name} must be {what}, not {value!r:.60}")
-    if time is not None:
-        return {"t": round(time * 1e9)}
-    return {"seq" if name == "event" else name: int(value) for name, value in chosen.items()}
+def until(batches: Iterable[Events], limits: Limits) -> Iterator[Events]:
+    """Yield the events up to an instant; read no batch beyond the one that holds it."""
+    for batch in batches:
+        part = batch.until(**limits) if limits else batch
+        yield part
+        if len(part) < len(batch):
+            return
 
 
-def check_limits(limits: Mapping[str, Any], *others: str) -> None:
-    """See that an instant is given as `Events.until` takes it.
-
-    Args:
-        limits: The instant, or what was given for one.
-        others: Names of arguments that there are beside it, for the message.
-
-    Raises:
-        BrrtError: A name is none of an instant, or a value no whole number from 0 on.
-    """
-    for name, value in limits.items():
-        if name not in _COLUMNS:
-            raise unknown("argument", name, (*others, *_COLUMNS))
-        if value is not None and not (_counts(value) and value == int(value)):
-            raise BrrtError(f"{name} must be a whole number from 0 on, not {value!r:.60}")
-
-
-def _counts(value: Any) -> bool:
-    """Whether it is a number from 0 on, and finite."""
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    return number and bool(0 <= value < math.inf)
-
-
-_COLUMNS = ("iteration", "seq", "t")
 _LIMITS = {"seq": "event", "iteration": "iteration"}
-_FOREVER = 9e9
-"""Longer than any run, in seconds; its nanoseconds fit into 64 bits. And more than any count."""
-
-
-class Structure:
-    """Keeps the events that trees are rebuilt from."""
-
-    def __init__(self, dof: int) -> None:
-        self._dof = dof
-        self._batches: list[Events] = []
-
-    def write(self, events: Events) -> None:
-        """Take in a batch."""
-        kept = {k: t for k in (Kind.EDGE, Kind.REWIRE) if len(t := events[k])}
-        if kept:
-            self._batches.append(Events(events.dof, kept))
-
-    def forest(self) -> Mapping[int, Tree]:
-        """Rebuild the trees.
-
-        Raises:
-            RecordingError: The events make no trees.
-        """
-        return forest(Events.concat(self._dof, self._batches))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Snapshot:
-    """A run as it stood at an instant; what is not asked for is not read.
+    """A run at an instant. Each property is folded from the events when it is first used.
 
     Attributes:
-        manifest: The run's.
-        world: Where it took place.
-        batches: Call it for the whole log.
-        limits: The instant, as `Events.until` takes it; the end where it is empty.
-        name: The recording's file; empty where there is none.
+        recording: The run.
+        limits: The instant, as `Events.until` takes it; the end of the run where it is empty.
     """
 
-    manifest: Manifest
-    world: World
-    batches: Callable[[], Iterator[Events]]
-    limits: Mapping[str, int]
-    name: str = ""
+    recording: Recording
+    limits: Limits = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        scenario = self.manifest.scenario
+        scenario = self.recording.manifest.scenario
         instant = ", ".join(
             f"after {value / 1e9:g} s" if name == "t" else f"after {_LIMITS[name]} {value:,}"
             for name, value in self.limits.items()
         )
         run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"
-        return f"<Moment of {run}: {instant or 'its end'}>"
+        return f"<Snapshot of {run}: {instant or 'its end'}>"
 
     @cached_property
     def events(self) -> Events:
-        """All events up to the instant and those of it."""
-        kept = _Kept()
+        """All events up to the instant."""
+        kept = Memory()
         self.feed(kept)
-        return Events.concat(self.manifest.dof, kept.batches)
+        return Events.concat(self.recording.manifest.dof, kept.batches)
 
     @cached_property
     def forest(self) -> Mapping[int, Tree]:
         """The trees by number: 0 grows from the start, 1 from the goal.
 
         Raises:
-            RecordingError: The log's edges make no trees.
+            RecordingError: The events do not make trees.
         """
-        structure = Structure(self.manifest.dof)
-        self.feed(structure)
-        return structure.forest()
+        edges = [
+            Events(batch.dof, {kind: batch[kind] for kind in (Kind.EDGE, Kind.REWIRE)})
+            for batch in self._batches()
+        ]
+        return forest(Events.concat(self.recording.manifest.dof, edges))
 
     @cached_property
     def metrics(self) -> Metrics:
-        """The figures, those that `brrt replay` prints: `metrics.as_dict()`."""
-        metrics = Metrics(self.manifest)
+        """The metrics, as `brrt replay` prints them: `metrics.as_dict()`."""
+        metrics = Metrics(self.recording.manifest)
         self.feed(metrics)
         return metrics
 
     @property
     def best_path(self) -> Path | None:
-        """Cost and waypoints, shape (n, dof), of the path that stood; None where none did."""
+        """Cost and waypoints, shape (n, dof), of the best path so far; None if there is none."""
         return self.metrics.best_path
 
     def node(self, node: int, tree: int = 0) -> NodeHistory | CellHistory:
-        """Tell what became of a node, or of a cell where the planner searches a lattice.
+        """Return the history of a node, or of a cell if the planner searches a lattice.
 
         Args:
             node: Its number.
             tree: Number of its tree.
 
         Raises:
-            BrrtError: There was no such node.
-            RecordingError: The log's edges make no trees.
+            BrrtError: There is no such node.
+            RecordingError: The events do not make trees.
         """
-        robot = self.manifest.make_robot().resolved(self.world)
-        trace, cell = NodeTrace(node, tree, self.manifest.dof), CellTrace(node, self.manifest)
+        run = self.recording
+        trace, cell = NodeTrace(node, tree, run.manifest.dof), CellTrace(node, run.manifest)
         self.feed(trace, cell)
         if trace.has_trees or not cell.has_cells:
-            return trace.history(robot, self.world)
+            return trace.history(run.robot(), run.world)
         if tree != 0:
             raise BrrtError("a planner on a lattice has cells and no trees; leave the tree out")
-        return cell.history(robot)
+        return cell.history(run.robot())
 
     def feed(self, *folds: Fold) -> None:
-        """Hand the events to folds of yours, such as `Metrics`, in one pass over the file."""
-        # What is in memory already need not be read again.
+        """Pass the events to folds, such as `Metrics`, in one pass over the recording."""
+        feed(self._batches(), folds, {})
+
+    def _batches(self) -> Iterator[Events]:
+        """Yield the events up to the instant; from memory if they have been read before."""
         known = self.__dict__.get("events")
-        if known is None:
-            feed(self.batches(), folds, self.limits)
-        else:
-            feed([known], folds, {})
+        yield from until(self.recording.batches(), self.limits) if known is None else [known]
 
 
-class _Kept:
-    """Keeps everything."""
+def snapshot(
+    recording: Recording,
+    *,
+    time: float | None = None,
+    event: int | None = None,
+    iteration: int | None = None,
+) -> Snapshot:
+    """Return a run at an instant; at its end if none is given.
 
-    def __init__(self) -> None:
-        self.batches: list[Events] = []
+    Nothing is read until a property of it is used, and then no further than the instant.
 
-    def write(self, events: Events) -> None:
-        """Take in a batch."""
-        self.batches.append(events)
+    Args:
+        recording: The run.
+        time: Seconds since the run began.
+        event: Number of the last event.
+        iteration: The last iteration.
+
+    Raises:
+        BrrtError: More than one is given, or a value is not a number from 0 on.
+    """
+    return Snapshot(recording, instant(time=time, event=event, iteration=iteration))

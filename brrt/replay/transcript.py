@@ -3,7 +3,7 @@
 Times, versions and folders are left out, and numbers are rounded to six digits.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from enum import IntEnum
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
+from brrt.recording import Recording
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
 
@@ -67,9 +68,6 @@ class Transcript:
         self._count(events, first, np.iinfo(np.int64).max)
         if len(events):
             self._iteration = max(self._iteration, events.last.iteration)
-
-    def close(self, *, whole: bool = True) -> None:
-        """Nothing to release."""
 
     def lines(self) -> Iterator[str]:
         """Tell what is known so far, line by line."""
@@ -204,15 +202,9 @@ def _text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def transcript(manifest: Manifest, robot: Robot, batches: Iterable[Events]) -> str:
-    """Tell a run's events in plain text, a line for each thing that matters.
-
-    Args:
-        manifest: The run's.
-        robot: What moves, settled in the world.
-        batches: Its events, in order.
-    """
-    told = Transcript(manifest, robot)
-    for batch in batches:
-        told.write(batch)
-    return "\n".join(told.lines()) + "\n"
+def transcript(recording: Recording) -> str:
+    """Return a run as plain text without times: the same on every machine."""
+    found = Transcript(recording.manifest, recording.robot())
+    for batch in recording.batches():
+        found.write(batch)
+    return "\n".join(found.lines()) + "\n"

@@ -48,9 +48,6 @@ class TreeStats:
             tree = self._trees.setdefault(number, _Growing(number))
             tree.write(*(_rows_of(table, number) for table in (edges, rewires)))
 
-    def close(self, *, whole: bool = True) -> None:
-        """Nothing to release."""
-
     def figures(self) -> list[TreeFigures]:
         """Return the figures of each tree.
 

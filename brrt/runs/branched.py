@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from brrt.events import Status
-from brrt.replay.snapshot import check_limits
+from brrt.recording import check_limits
 from brrt.runs import branch
 from brrt.runs.branch import Recorded
 from brrt.runs.resume import Anew, Onward, proved

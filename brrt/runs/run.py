@@ -16,6 +16,7 @@ from brrt.kernels.emit import EventLog
 from brrt.planners import PLANNERS
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
+from brrt.recording import Memory, Recording, Result, Sink
 from brrt.replay.metrics import Metrics
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
@@ -24,16 +25,6 @@ from brrt.validate import check_possible
 from brrt.worlds.world import World
 
 _SWITCH_S = 0.0005
-
-
-class Sink(Protocol):
-    """Where events go."""
-
-    def write(self, events: Events) -> None:
-        """Take a batch."""
-
-    def close(self, *, whole: bool) -> None:
-        """Release everything; `whole` says that the run came to its own end."""
 
 
 class Solver(Protocol):
@@ -156,7 +147,7 @@ class Run:
         """
         sinks = list(sinks)
         metrics = Metrics(self.manifest)
-        whole = False
+        result: Result | None = None
         patience = sys.getswitchinterval()
         try:
             # Between two batches the planner must not wait 5 ms for a recorder to let go.
@@ -167,11 +158,17 @@ class Run:
                 metrics.write(batch)
                 if watch is not None:
                     watch(metrics)
-            whole = True
+            result = metrics.as_dict()
         finally:
             sys.setswitchinterval(patience)
-            _close_all(sinks, whole=whole)
+            _close_all(sinks, result)
         return metrics
+
+    def record(self) -> Recording:
+        """Run to the end and return the recording, in memory."""
+        memory = Memory()
+        self.execute([memory])
+        return memory.recording(self.manifest, self.problem.world)
 
 
 def _named(scenario: Scenario, planner: Solver) -> Scenario:
@@ -194,13 +191,13 @@ def _last_path(batch: Events, before: Any) -> Any:
     return batch[Kind.PATH][-1] if Kind.PATH in batch.counts else before
 
 
-def _close_all(sinks: list[Sink], *, whole: bool) -> None:
+def _close_all(sinks: list[Sink], result: Result | None) -> None:
     """Close every sink, even if one of them fails."""
     if sinks:
         try:
-            sinks[0].close(whole=whole)
+            sinks[0].close(result)
         finally:
-            _close_all(sinks[1:], whole=whole)
+            _close_all(sinks[1:], result)
 
 
 @cache

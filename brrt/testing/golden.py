@@ -9,8 +9,10 @@ from typing import Any
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.files import replacing
-from brrt.formats import McapSink, Memory, Recording, read
+from brrt.formats import McapSink, read
 from brrt.planners import PLANNERS
+from brrt.recording import Memory, Recording
+from brrt.replay.metrics import Metrics, metrics
 from brrt.runs.branched import RepeatedRun
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
@@ -85,11 +87,13 @@ def save(recording: Recording, path: Path) -> None:
         raise RecordingError(f"cannot write {path}: {error.strerror or error}") from None
     with replacing(path) as unfinished, ExitStack() as stack:
         sink = McapSink(unfinished, recording.manifest, recording.world)
-        stack.callback(sink.close, whole=False)
+        stack.callback(sink.close, None)
+        found = Metrics(recording.manifest)
         for batch in recording.batches():
             sink.write(batch)
+            found.write(batch)
         stack.pop_all()
-        sink.close(whole=True)
+        sink.close(found.as_dict())
 
 
 def _check_budget(scenario: Scenario) -> None:
@@ -117,4 +121,4 @@ def _by_logical_clock(recording: Recording) -> Recording:
     if recording.result is None:
         return retimed
     # The figures that the writer found hold times of the real clock.
-    return replace(retimed, result=retimed.metrics().as_dict())
+    return replace(retimed, result=metrics(retimed).as_dict())

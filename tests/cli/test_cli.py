@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from brrt import read
+from brrt import metrics, read
 from tests.conftest import Result
 
 Command = Callable[..., Result]
@@ -248,7 +248,7 @@ def test_signals_close_the_files(number: signal.Signals, tmp_path: Path) -> None
     assert figures["status"] == "interrupted"
     for name in ("run.mcap", "run.rrd"):
         recording = read(tmp_path / name)
-        assert recording.metrics().as_dict() == figures == recording.result
+        assert metrics(recording).as_dict() == figures == recording.result
 
 
 def test_help_is_fast_and_teaches(shell: Command) -> None:

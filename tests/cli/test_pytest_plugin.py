@@ -141,7 +141,7 @@ def test_file(brrt_golden):
     brrt_golden("ours", "plan.toml")
 
 def test_run(brrt_golden):
-    assert brrt_golden("ours", brrt.Run(OURS)).metrics().solved
+    assert brrt.metrics(brrt_golden("ours", brrt.Run(OURS))).solved
 
 def test_alone(brrt_golden):
     brrt_golden("ours")

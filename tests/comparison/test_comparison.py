@@ -26,11 +26,12 @@ from brrt import (
     World,
     compare,
     read,
+    snapshot,
 )
 from brrt.formats import CutError
 from brrt.scenario.manifest import Branch
 from tests.cli.test_replay import cut
-from tests.conftest import Result, recorded
+from tests.conftest import Result, recorded, result_of
 
 SCENARIO = Scenario(world="circles2d:n=40,seed=3", seed=7, clock="logical")
 OTHER = replace(SCENARIO, params={"step": 1.5})
@@ -61,7 +62,7 @@ def filed(run: Live, path: Path, *, whole: bool = True) -> Path:
     else:
         sink = McapSink(path, manifest, world)
     sink.write(log)
-    sink.close(whole=whole)
+    sink.close(result_of(manifest, log) if whole else None)
     return path
 
 
@@ -315,7 +316,7 @@ def test_runs_in_memory_and_what_is_none() -> None:
 def test_short_words_for_long_things(tmp_path: Path) -> None:
     """What Python prints of a recording, an instant or a comparison fits a line or a screen."""
     recording = read(filed(live(SCENARIO), tmp_path / "run.mcap"))
-    moment, found = recording.at(iteration=20), compare(recording, live(OTHER))
+    moment, found = snapshot(recording, iteration=20), compare(recording, live(OTHER))
     assert str(found).splitlines() == found.lines()
     for each in (recording, moment, found):
         assert len(repr(each)) < 120
@@ -329,7 +330,7 @@ def test_reading_a_cut_file_in_part(kind: str, tmp_path: Path) -> None:
     path = filed(live(SCENARIO), tmp_path / f"run{kind}")
     path.write_bytes(path.read_bytes()[:-300])
     with pytest.raises(CutError, match=r"partial=True\) takes what is whole$"):
-        _ = read(path).at().events
+        _ = snapshot(read(path)).events
     part = read(path, partial=True)
     assert part.result is None
     assert compare(part, live(SCENARIO)).cuts[0] == (len(part.events()), part.events().last.t / 1e9)

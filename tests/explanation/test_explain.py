@@ -13,7 +13,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import BrrtError, Kind, Memory, Polygon, Recording, Run, Scenario, World, make_world, read
+from brrt import (
+    BrrtError,
+    Kind,
+    Memory,
+    Polygon,
+    Recording,
+    Run,
+    Scenario,
+    World,
+    make_world,
+    read,
+    snapshot,
+)
 from brrt.events import Reason, Source, table_dtype
 from brrt.explanation import Advice, Explanation, explain
 from brrt.explanation.clearance import Ways
@@ -39,7 +51,7 @@ def explained(scenario: Scenario, size: int = 500, **at: int) -> Explanation:
     """Explain a scenario's run, read in batches of some size."""
     run, log = recorded(scenario)
     parts = cut(log, size)
-    return explain(Recording(run.manifest, run.problem.world, lambda: iter(parts), None).at(**at))
+    return explain(snapshot(Recording(run.manifest, run.problem.world, lambda: iter(parts)), **at))
 
 
 @settings(max_examples=15)
@@ -156,7 +168,7 @@ def test_every_planner_and_robot_is_explained(name: str) -> None:
     """Also as it stood before anything had happened, and in JSON."""
     recording = read(GOLDEN / f"{name}.mcap")
     for at in (0, None):
-        found = explain(recording.at(event=at))
+        found = explain(snapshot(recording, event=at))
         assert json.loads(json.dumps(found.as_dict(), allow_nan=False))
         assert found.rows()[1][0] == "outcome"
         assert len(found.advice) <= 3
@@ -165,7 +177,7 @@ def test_every_planner_and_robot_is_explained(name: str) -> None:
 def test_a_recording_is_explained_at_its_end() -> None:
     """A path is not taken for one: the message says how it becomes one."""
     file = GOLDEN / "circles2d-chain.mcap"
-    assert str(explain(read(file))) == str(explain(read(file).at()))
+    assert str(explain(read(file))) == str(explain(snapshot(read(file))))
     for path in (file, str(file)):
         with pytest.raises(BrrtError, match=r"brrt\.explain\(brrt\.read\('.*chain\.mcap'\)\)$"):
             explain(path)  # type: ignore[arg-type]
@@ -179,12 +191,12 @@ def test_a_planner_from_outside_is_explained() -> None:
     run, log = Run(scenario, planner=toys.Pair()), Memory()
     run.execute([log])
     whole = Recording(run.manifest, run.problem.world, lambda: iter(log.batches), None)
-    found = explain(whole.at(iteration=2))
+    found = explain(snapshot(whole, iteration=2))
     assert found.facts.contract is None
     assert found.facts.gap is not None
     a, b = found.facts.gap.q, found.facts.gap.other
     assert found.facts.gap.far == np.linalg.norm(np.subtract(a, b))
-    trees = whole.at(iteration=2).forest
+    trees = snapshot(whole, iteration=2).forest
     least = min(float(np.linalg.norm(trees[1].q - q, axis=1).min()) for q in trees[0].q)
     assert found.facts.gap.far == least
 
@@ -222,7 +234,7 @@ def test_what_is_advised_first_helps(case: str, brrt: Command) -> None:
     words = commands(done.out)[0]
     assert change in " ".join(words)
     assert brrt(*words).code == 0
-    assert read(Path("run-1.mcap")).at().best_path is not None
+    assert snapshot(read(Path("run-1.mcap"))).best_path is not None
 
 
 BODY = "polygon:length=8,width=7"
@@ -299,7 +311,7 @@ def test_it_fits_a_screen(brrt: Command) -> None:
         text = brrt("explain", "run.mcap").out
         assert all(len(line) <= 80 for line in text.splitlines())
         assert len(text.splitlines()) <= 33
-        assert text == str(explain(read(Path("run.mcap")).at())) + "\n"
+        assert text == str(explain(snapshot(read(Path("run.mcap"))))) + "\n"
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from brrt import Events, Kind
 from brrt.events import table_dtype
 from brrt.formats.background import Background
 from brrt.formats.batching import Gathering
+from brrt.recording import Result
 
 NOTHING = Events(0, {})
 
@@ -77,13 +78,13 @@ def test_nothing_waits_for_a_planner_that_thinks() -> None:
             due = self.held.add(events)
             out.extend([] if due is None else [due])
 
-        def close(self, *, whole: bool) -> None:
-            assert whole
+        def close(self, result: Result | None) -> None:
+            assert result is not None
 
     background = Background(Sink())
     background.write(batch(0, 5))
     end = time.monotonic() + 10
     while not out and time.monotonic() < end:
         time.sleep(0.01)
-    background.close(whole=True)
+    background.close({})
     assert [len(each) for each in out] == [5]

@@ -22,7 +22,7 @@ from brrt.formats.recover import recover
 from brrt.formats.rrd.frames import FRAME
 from brrt.formats.rrd.outline import Outline
 from brrt.views.rerun.sink import RerunSink
-from tests.conftest import Result, recorded
+from tests.conftest import Result, recorded, result_of
 
 SCENARIO = Scenario(world="circles2d:n=9", seed=1, clock="logical", iterations=60)
 pa: Any = pyarrow  # mypy knows none of its names
@@ -39,7 +39,7 @@ def write(path: Path, events: Events | None = None) -> Events:
     else:
         sink = McapSink(path, run.manifest, run.problem.world)
     sink.write(log if events is None else events)
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, log if events is None else events))
     return log
 
 

@@ -14,11 +14,12 @@ from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from brrt import BrrtError, Events, Kind, McapSink, RecordingError, Run, Scenario, read
+from brrt import BrrtError, Events, Kind, McapSink, RecordingError, Run, Scenario, metrics, read
 from brrt.events import FIELDS
-from brrt.formats import CutError, Memory
+from brrt.formats import CutError
 from brrt.formats.background import Background
 from brrt.formats.mcap.cdr import Layout, definition
+from brrt.recording import Memory, Result
 
 SCENARIOS = {
     "2d": Scenario(world="circles2d:n=40,seed=3", seed=7, clock="logical"),
@@ -54,7 +55,7 @@ def test_round_trip(name: str, tmp_path: Path) -> None:
     assert same(recording.events(), log)
     assert recording.manifest == run.manifest
     assert recording.world.to_json() == run.problem.world.to_json()
-    assert recording.result == recording.metrics().as_dict()
+    assert recording.result == metrics(recording).as_dict()
 
 
 def test_stock_mcap_decodes_every_message(tmp_path: Path) -> None:
@@ -76,7 +77,7 @@ def test_stock_mcap_decodes_every_message(tmp_path: Path) -> None:
                 assert np.array_equal(
                     np.ravel(row[field.name]), np.ravel(getattr(decoded, field.name))
                 )
-        figures = read(tmp_path / "run.mcap").metrics().as_dict()
+        figures = metrics(read(tmp_path / "run.mcap")).as_dict()
         statistics = reader.get_summary()
     assert statistics is not None
     assert statistics.statistics is not None
@@ -241,9 +242,9 @@ def test_background_raises_what_its_sink_raises() -> None:
         def write(self, events: Events) -> None:
             raise RecordingError("broken")
 
-        def close(self, *, whole: bool) -> None:
+        def close(self, result: Result | None) -> None:
             self.closed = True
-            assert not whole
+            assert result is None
 
     sink, run = Broken(), Run(SCENARIOS["2d"], batch=20)
     with pytest.raises(RecordingError, match="broken"):

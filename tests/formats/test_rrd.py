@@ -20,18 +20,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
-from brrt import Events, Kind, RecordingError, Run, Scenario, read
+from brrt import Events, Kind, RecordingError, Run, Scenario, metrics, read
 from brrt.events import FIELDS, Stage, table_dtype
-from brrt.formats import CutError, Memory
+from brrt.formats import CutError
 from brrt.formats.rrd.checksum import BLANK
 from brrt.formats.rrd.frames import FRAME
 from brrt.formats.rrd.outline import Outline
 from brrt.formats.rrd.reader import read_rerun
+from brrt.recording import Memory
 from brrt.views.rerun import layout, sink
 from brrt.views.rerun.arrow import event_columns, time_columns, to_arrow
 from brrt.views.rerun.draw import canvas, decimate, trees
 from brrt.views.rerun.sink import RerunSink, recording_id
 from brrt.views.viewer import process
+from tests.conftest import result_of
 
 SCENARIOS = {
     "2d": Scenario(world="circles2d:n=30", seed=7, clock="logical", params={"step": 2.0}),
@@ -101,7 +103,7 @@ def test_round_trip(name: str, tmp_path: Path) -> None:
     assert same(recording.events(), log)
     assert recording.manifest == run.manifest
     assert recording.world.to_json() == run.problem.world.to_json()
-    assert recording.result == recording.metrics().as_dict()
+    assert recording.result == metrics(recording).as_dict()
 
 
 def test_batches_come_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -227,7 +229,7 @@ def test_tree_of_many_nodes(tmp_path: Path) -> None:
     sink = RerunSink(run.manifest, run.problem.world, path=path)
     for part in np.array_split(edges, 7):
         sink.write(Events(2, {Kind.EDGE: part}))
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest))
     strips = np.concatenate([np.array(row) for row in column(path, "/world/tree/start", ":strips")])
     wanted = np.stack([edges["q"][:-1], edges["q"][1:]], axis=1)
     assert np.array_equal(strips, wanted.astype(np.float32))
@@ -290,7 +292,7 @@ def test_trees_have_names_and_colours(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     sink = RerunSink(run.manifest, run.problem.world, path=path)
     sink.write(Events(2, {Kind.EDGE: edges}))
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest))
     assert [
         len(column(path, f"/world/tree/{name}", ":strips")) for name in ("start", "goal", "2")
     ] == [
@@ -331,8 +333,8 @@ def test_run_that_did_not_end(tmp_path: Path) -> None:
     batches = [next(events) for _ in range(3)]
     for batch in batches:
         sink.write(batch)
-    sink.close(whole=False)
-    sink.close(whole=False)
+    sink.close(None)
+    sink.close(None)
     recording = read(tmp_path / "run.rrd")
     assert recording.result is None
     assert same(recording.events(), Events.concat(2, batches))
@@ -399,7 +401,7 @@ def test_written_anew_by_other_tools(tmp_path: Path) -> None:
     rerun_command(tmp_path, "rrd", "optimize", "run.rrd", "-o", "other.rrd")
     recording = read(tmp_path / "other.rrd")
     assert same(recording.events(), log)
-    assert recording.result == recording.metrics().as_dict()
+    assert recording.result == metrics(recording).as_dict()
 
 
 def test_missing_events(tmp_path: Path) -> None:
@@ -474,7 +476,7 @@ def test_disk_that_fills_up(tmp_path: Path) -> None:
             for batch in batches * 3:
                 sink.write(batch)
         with pytest.raises(RecordingError, match=message):
-            sink.close(whole=False)
+            sink.close(None)
     assert path.stat().st_size == 200_000
 
 
@@ -491,7 +493,7 @@ def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         memory.write(batch)
         if number == 3:
             other.disconnect()
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, memory.events()))
     assert same(read(tmp_path / "run.rrd").events(), memory.events())
 
 

@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 
 from brrt import Events, Kind, McapSink, RecordingError, Run, Scenario, first_difference, read
 from brrt.events import table_dtype
-from brrt.formats import CutError, DamagedError, Memory
+from brrt.formats import CutError, DamagedError
 from brrt.formats.background import Background
 from brrt.formats.integrity import Numbering
 from brrt.formats.mcap import writer
@@ -30,10 +30,11 @@ from brrt.formats.rrd.checksum import BLANK, WRITTEN
 from brrt.formats.rrd.frames import BATCH, FRAME, HEAD, unpacked
 from brrt.formats.rrd.outline import Outline
 from brrt.planners.base.stop import Stop
+from brrt.recording import Memory
 from brrt.views.rerun import sink
 from brrt.views.rerun.pipe import Drain
 from brrt.views.rerun.sink import RerunSink
-from tests.conftest import Result, recorded
+from tests.conftest import Result, recorded, result_of
 
 SCENARIO = Scenario(world="circles2d:n=40", seed=7, clock="logical")
 ENDINGS = (".mcap", ".rrd")
@@ -53,7 +54,7 @@ def write(path: Path, batch: int = 100) -> Events:
     sink = new_sink(path, run)
     for first in range(0, len(log), batch):
         sink.write(part(log, first, first + batch))
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, log))
     return log
 
 
@@ -101,7 +102,7 @@ def test_killed_at_any_batch(ending: str, tmp_path: Path) -> None:
         assert isinstance(error, CutError)
         assert len(events) == min(first + 100, len(log))
         assert begins(log, events)
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, log))
     assert [p.name for p in tmp_path.iterdir() if p != left] == [path.name]
 
 
@@ -150,9 +151,9 @@ def run_all(sink: Any, log: Events) -> None:
         for first in range(0, len(log), 100):
             sink.write(part(log, first, first + 100))
     except BaseException:
-        sink.close(whole=False)
+        sink.close(None)
         raise
-    sink.close(whole=True)
+    sink.close(result_of(recorded(SCENARIO)[0].manifest, log))
 
 
 def test_nothing_is_written_behind_a_batch_that_failed() -> None:
@@ -166,8 +167,8 @@ def test_nothing_is_written_behind_a_batch_that_failed() -> None:
             if len(got) == 2:
                 raise MemoryError("too much")
 
-        def close(self, *, whole: bool) -> None:
-            assert not whole
+        def close(self, result: Any) -> None:
+            assert result is None
 
     with pytest.raises(MemoryError, match="too much"):
         run_all(Background(Shaky()), log)
@@ -342,12 +343,11 @@ def test_recover_up_to_a_gap_or_an_impossible_value(ending: str, tmp_path: Path)
         (int(samples["seq"][at]), odd),
     ]:
         sink = new_sink(path, run)
-        if events is log:
-            sink.write(part(log, 0, k))
-            sink.write(part(log, k + 1, len(log)))
-        else:
-            sink.write(odd)
-        sink.close(whole=True)
+        whole_log = events is log
+        written = [part(log, 0, k), part(log, k + 1, len(log))] if whole_log else [odd]
+        for each in written:
+            sink.write(each)
+        sink.close(result_of(run.manifest, *written))
         found = recover(path, whole)
         assert (found.events, found.complete) == (k, False)
         assert "damaged" in (found.lost or "")
@@ -500,7 +500,7 @@ def test_power_cut_that_leaves_zeros(ending: str, brrt: Command, tmp_path: Path)
     sink = new_sink(path, run)
     sink.write(part(log, 0, 300))
     data = path.read_bytes()
-    sink.close(whole=False)
+    sink.close(None)
     for size in (1 << 12, 1 << 24):
         for keep in (len(data), len(data) - 20):
             path.write_bytes(data[:keep] + bytes(size))

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import BrrtError, Events, Kind, Metrics, Recording, Scenario, forest, read
+from brrt import BrrtError, Events, Kind, Metrics, Recording, Scenario, forest, read, snapshot
 from brrt.events import Reason
 from brrt.replay.cell_history import CellHistory
 from brrt.replay.history_records import NodeHistory
@@ -52,7 +52,7 @@ def test_a_moment_is_the_log_up_to_it(data: st.DataObject) -> None:
     # Event n of a logical clock happens at n us.
     limits = {"event": {"seq": at}, "time": {"t": 1000 * at}, "iteration": {"iteration": at}}[name]
     given_: Any = at * 1e-6 if name == "time" else at
-    moment = recording(scenario, data.draw(st.integers(5, 400))).at(**{name: given_})
+    moment = snapshot(recording(scenario, data.draw(st.integers(5, 400))), **{name: given_})
     part = log.until(**limits)
     metrics = Metrics(run.manifest)
     metrics.write(part)
@@ -88,7 +88,7 @@ def test_no_more_is_read_than_is_needed() -> None:
             yield part
 
     whole = Recording(run.manifest, run.problem.world, batches, None)
-    moment = whole.at(event=120)
+    moment = snapshot(whole, event=120)
     assert taken == []
     assert len(moment.forest[0]) > 10
     assert taken == [0, 1, 2]
@@ -109,7 +109,7 @@ def test_no_more_is_read_than_is_needed() -> None:
 def test_an_instant_that_is_none(wrong: dict[str, Any]) -> None:
     """It is refused before anything is read."""
     with pytest.raises(BrrtError):
-        recording(STAR).at(**wrong)
+        snapshot(recording(STAR), **wrong)
 
 
 @dataclass
@@ -165,7 +165,9 @@ def test_a_nodes_history_is_what_happened_to_it(data: st.DataObject) -> None:
     edges = part[Kind.EDGE][part[Kind.EDGE]["tree"] == number]
     rewired = part[Kind.REWIRE]["node"][part[Kind.REWIRE]["tree"] == number].tolist()
     node = data.draw(st.sampled_from(rewired or [0]) | st.integers(0, len(edges) - 1))
-    found = recording(scenario, data.draw(st.integers(5, 400))).at(event=at).node(node, number)
+    found = snapshot(recording(scenario, data.draw(st.integers(5, 400))), event=at).node(
+        node, number
+    )
     assert isinstance(found, NodeHistory)
     naive, turns = _turns(part, number, node)
     assert found.born.event == edges["seq"][node]
@@ -194,9 +196,9 @@ def test_the_sample_is_the_one_that_was_followed() -> None:
     samples = log[Kind.SAMPLE]
     for size in (7, 1000):
         run = recording(STAR, size)
-        assert run.at().node(0).sample is None  # type: ignore[union-attr]
+        assert snapshot(run).node(0).sample is None  # type: ignore[union-attr]
         for node in range(1, 60, 7):
-            found = run.at().node(node)
+            found = snapshot(run).node(node)
             assert isinstance(found, NodeHistory)
             assert found.sample is not None
             before = samples[samples["seq"] < found.born.event][-1]
@@ -208,10 +210,10 @@ def test_nodes_of_the_path_know_it() -> None:
     """Each waypoint is a node, and the history says which waypoint."""
     run, (_, log) = recording(STAR), recorded(STAR)
     raw = next(p for p in log[Kind.PATH][::-1] if p["stage"] != 1)["waypoints"]
-    tree = run.at().forest[0]
+    tree = snapshot(run).forest[0]
     for i, q in enumerate(raw):
         node = int(np.flatnonzero((tree.q == q).all(axis=1))[0])
-        found = run.at().node(node)
+        found = snapshot(run).node(node)
         assert isinstance(found, NodeHistory)
         assert found.paths["raw"] == i
         assert np.array_equal(tree.q[found.lineage], raw[: i + 1])
@@ -222,7 +224,7 @@ def test_a_cells_history() -> None:
     _, log = recorded(WALK)
     run = recording(WALK)
     for cell in np.unique(log[Kind.EXPAND]["cell"])[::7].tolist():
-        found = run.at().node(cell)
+        found = snapshot(run).node(cell)
         assert isinstance(found, CellHistory)
         for kind, told in (
             (Kind.EXPAND, [look.when.event for look in found.looks]),
@@ -239,7 +241,7 @@ def test_a_cells_history() -> None:
 def test_node_on_the_command_line(brrt: Command) -> None:
     """For people and as JSON, which is what Python has."""
     brrt("plan", "--planner", "bi-rrt-star", "--iterations", 200, "--out", "a.mcap")
-    moment = read(Path("a.mcap")).at(iteration=150)
+    moment = snapshot(read(Path("a.mcap")), iteration=150)
     node = int(moment.events[Kind.REWIRE]["node"][moment.events[Kind.REWIRE]["tree"] == 1][-1])
     at = ("--at-iteration", 150)
     done = brrt("replay", "a.mcap", "--node", node, "--tree", "goal", *at, "--json")

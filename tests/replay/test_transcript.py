@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ FILES = sorted(RECORDINGS.glob("*.mcap"))
 def test_counts_are_the_logs(path: Path) -> None:
     """All that is counted adds up to the events of each kind, whatever the phases."""
     recording = brrt.read(path)
-    text, events = recording.text(), recording.events()
+    text, events = transcript(recording), recording.events()
     for kind, word in ((Kind.SAMPLE, "samples?"), (Kind.REJECT, "rejected"), (Kind.MOVE, "moves?"),
                        (Kind.EDGE, "nodes?"), (Kind.EXPAND, "cells? expanded")):  # fmt: skip
         told = re.findall(rf"^[\d,]*\s+([\d,]+) {word}\b", text, re.MULTILINE)
@@ -42,7 +43,7 @@ def test_batches_do_not_matter(size: int) -> None:
         tables = {kind: table[table["seq"] >= before] for kind, table in part.tables.items()}
         parts.append(brrt.Events(events.dof, {k: t for k, t in tables.items() if len(t)}))
         before = end
-    assert transcript(recording.manifest, recording.robot(), parts) == recording.text()
+    assert transcript(replace(recording, batches=lambda: parts)) == transcript(recording)
 
 
 def test_no_time_and_no_folder(tmp_path: Path) -> None:
@@ -53,9 +54,7 @@ def test_no_time_and_no_folder(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         world.save(tmp_path / folder / "w.json")
         scenario = brrt.Scenario(world=str(tmp_path / folder / "w.json"), seed=5)
-        run, log = brrt.Run(scenario), brrt.Memory()
-        run.execute([log])
-        texts.append(transcript(run.manifest, run.problem.robot, [log.events()]))
+        texts.append(transcript(brrt.Run(scenario).record()))
     assert texts[0] == texts[1]
     assert "w.json" in texts[0]
     assert str(tmp_path) not in texts[0]
@@ -67,7 +66,7 @@ def test_failure_says_how_near_it_came() -> None:
     edges = recording.events()[Kind.EDGE]
     far = recording.robot().distance(edges["q"], np.array(recording.manifest.goal))
     best = edges[far.argmin()]
-    text = recording.text()
+    text = transcript(recording)
     assert "no path" in text
     assert f"node {best['node']:,} of iteration {best['iteration']:,}, {far.min():.6g}" in text
 

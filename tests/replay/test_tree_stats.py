@@ -23,7 +23,6 @@ def followed(batches: list[Events]) -> list[TreeFigures]:
     growth = TreeStats()
     for batch in batches:
         growth.write(batch)
-    growth.close()
     return growth.figures()
 
 

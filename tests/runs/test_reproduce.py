@@ -16,7 +16,7 @@ from brrt import BrrtError, Events, Kind, McapSink, Run, Scenario, World, plan_a
 from brrt.events import Phase, Status
 from brrt.runs.reproduce import Again
 from tests.cli.test_replay import cut
-from tests.conftest import Result, recorded
+from tests.conftest import Result, recorded, result_of
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 PLAIN = Scenario(world="circles2d:n=30,seed=3", seed=7, execute=True, max_move=3.0)
@@ -162,7 +162,7 @@ def foreign(folder: Path) -> Path:
     sink = McapSink(folder / "foreign.mcap", replace(run.manifest, scenario=scenario),
                     run.problem.world)  # fmt: skip
     sink.write(log)
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, log))
     return folder / "foreign.mcap"
 
 
@@ -195,7 +195,7 @@ def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: 
     other = doctored(log, Kind.SAMPLE, "q", lambda q: q * 0.999)
     sink = McapSink(tmp_path / "run.mcap", run.manifest, run.problem.world)
     sink.write(other)
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, other))
     done = brrt("verify", "run.mcap", "--rerun")
     assert done.code == 1
     assert "They part at event" in done.out

@@ -41,7 +41,7 @@ def run(golden: ModuleType, monkeypatch: pytest.MonkeyPatch, *args: str) -> int:
 def test_replays_to_the_figures_it_holds(path: Path) -> None:
     """The fold over the events gives what the writer found; a newer brrt has more figures."""
     recording = brrt.read(path)
-    figures = recording.metrics().as_dict()
+    figures = brrt.metrics(recording).as_dict()
     assert recording.result is not None
     assert {name: figures[name] for name in recording.result} == recording.result
     edges = recording.events()[brrt.Kind.EDGE]
@@ -60,7 +60,7 @@ def test_plans_to_the_same_events(path: Path) -> None:
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_told_as_it_was(path: Path) -> None:
     """The account of the events is the one that is kept, word for word."""
-    assert brrt.read(path).text() == path.with_suffix(".txt").read_text("utf-8")
+    assert brrt.transcript(brrt.read(path)) == path.with_suffix(".txt").read_text("utf-8")
 
 
 def test_manifest_makes_them(golden: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:

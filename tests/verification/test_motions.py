@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.robots import Point
+from brrt.verification.collision import obstacles as obstacles_module
 from brrt.verification.collision.motions import Obstacles, all_clear, first_hits, near
 from brrt.worlds import World
 from tests.robots.test_robots import BODIES, MAKERS, free, random_edges, random_world
@@ -36,8 +37,8 @@ def test_near_is_every_pair_that_meets(seed: int, dim: int, n: int, batch: int) 
     low = rng.integers(-2, 12, (n, dim)).astype(float)
     high = low + rng.integers(0, 8, (n, dim)) // rng.integers(1, 8, (n, 1))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(obstacles, "_CANDIDATES", batch)
-        patched.setattr(obstacles, "_PAIRS", batch)
+        patched.setattr(obstacles_module, "_CANDIDATES", batch)
+        patched.setattr(obstacles_module, "_PAIRS", batch)
         found = [pair for i, j in near(low, high, obstacles) for pair in zip(i, j, strict=True)]
     meet = (low[:, None] <= obstacles.upper) & (obstacles.lower <= high[:, None])
     expected = np.argwhere(meet.all(axis=2)).tolist()

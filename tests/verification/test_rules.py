@@ -18,7 +18,7 @@ from brrt.events import Phase, Reason, Status, table_dtype
 from brrt.replay.metrics import Metrics
 from brrt.scenario.contract import Contract, Near
 from brrt.verification import RULES, examine
-from tests.conftest import Result
+from tests.conftest import Result, result_of
 from tests.support import scenarios
 from tests.support.toys import TOYS
 
@@ -542,7 +542,7 @@ def test_broken_rules_come_first(brrt: Callable[..., Result], tmp_path: Path) ->
     case = evidence("rrt").edit(Kind.SAMPLE, 1, q=[-3.0, 5.0])
     sink = McapSink(tmp_path / "bad.mcap", case.manifest, case.world)
     sink.write(case.log)
-    sink.close(whole=True)
+    sink.close(result_of(case.manifest, case.log))
     done = brrt("verify", tmp_path / "bad.mcap")
     assert done.code == 1
     assert "BROKEN" in done.out.splitlines()[0]

@@ -15,6 +15,7 @@ from brrt.events import Reason, Table, table_dtype
 from brrt.views.rerun import draw_world, layout, sink
 from brrt.views.rerun.draw import decimate, pages, paths
 from brrt.views.rerun.sink import RerunSink
+from tests.conftest import result_of
 
 SQUARES = "squares2d:n=30,seed=3"
 PLANNERS: dict[str, dict[str, Any]] = {
@@ -155,7 +156,7 @@ def test_tree_that_is_rewired_late(tmp_path: Path) -> None:
     sink = RerunSink(run.manifest, run.problem.world, path=path)
     for batch in batches:
         sink.write(batch)
-    sink.close(whole=True)
+    sink.close(result_of(run.manifest, *batches))
     log = Events.concat(2, batches)
     grown = [line for _, row in rows(path, "/world/tree/start", ":strips") for line in row]
     assert as_set(grown) == as_set(edges_of(log.until(seq=99)))
@@ -375,7 +376,7 @@ def test_same_picture_from_a_file(tmp_path: Path) -> None:
     sink = RerunSink(recording.manifest, recording.world, path=again)
     for batch in recording.batches():
         sink.write(batch)
-    sink.close(whole=True)
+    sink.close(recording.result)
     pictures = [rows_of(path, "/world/tree/start_pages/", ":strips") for path in (live, again)]
     for seq in (10**9, 5000):
         assert len(shown(pictures[0], seq)) > 100

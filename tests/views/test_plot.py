@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from brrt import BrrtError, Events, Kind, Metrics, Recording, forest, read
+import brrt
+from brrt import BrrtError, Events, Kind, Metrics, Recording, forest, metrics, plot, read
 from brrt.events import Stage, table_dtype
 from brrt.views.matplotlib import curves, style
 from brrt.views.matplotlib.animation import Pace, instants, save_animation
@@ -331,14 +332,14 @@ def test_the_cost_curve_is_the_metrics(name: str) -> None:
     """After each iteration the curve stands where the figures do."""
     saved = golden(name)
     log = saved.events()
-    ax = saved.plot(Figure().subplots(), what="cost")
+    ax = plot(saved, Figure().subplots(), what="cost")
     x, y = (np.asarray(values) for values in ax.lines[0].get_data())
     assert ax.lines[0].get_drawstyle() == "steps-post"
     for iteration in range(int(x[0]), int(x[-1])):
         metrics = Metrics(saved.manifest)
         metrics.write(log.until(iteration=iteration))
         assert y[np.flatnonzero(x <= iteration)[-1]] == metrics.as_dict()["path_cost"]
-    figures = saved.metrics().as_dict()
+    figures = brrt.metrics(saved).as_dict()
     assert (x[0], y[0]) == (figures["first_path_iteration"], figures["first_path_cost"])
     assert (x[-1], y[-1]) == (figures["iterations"], figures["path_cost"])
     assert ax.lines[2].get_ydata()[0] == figures["smoothed_cost"]
@@ -396,7 +397,7 @@ def test_time_adds_up() -> None:
     curves.draw_time(axes, run)
     per_iteration, rejected, pace = (ax.patches[0].get_data() for ax in axes)
     widths = np.diff(per_iteration.edges)
-    figures = golden("circles2d-rrt-star").metrics().as_dict()
+    figures = metrics(golden("circles2d-rrt-star")).as_dict()
     assert per_iteration.edges[-1] == figures["iterations"]
     assert (per_iteration.values * widths).sum() == pytest.approx(
         1e6 * figures["plan_time_s"], rel=0.01
@@ -464,12 +465,12 @@ def test_many_edges_make_a_small_file(tmp_path: Path) -> None:
 def test_axes_of_ones_own() -> None:
     """They are returned; those of no use are refused; a run may be cut."""
     ax = Figure().subplots()
-    assert golden("circles2d-rrt").plot(ax, seq=50) is ax
+    assert plot(golden("circles2d-rrt"), ax, seq=50) is ax
     assert "iteration" in ax.get_title(loc="left")
     with pytest.raises(BrrtError, match="the world is 3D"):
-        golden("boxes3d-lrta-star").plot(Figure().subplots())
+        plot(golden("boxes3d-lrta-star"), Figure().subplots())
     with pytest.raises(BrrtError, match="unknown panel 'tre'; did you mean 'tree'"):
-        golden("circles2d-rrt").plot(ax, what="tre")
+        plot(golden("circles2d-rrt"), ax, what="tre")
 
 
 # Animations

@@ -60,7 +60,7 @@ def drawn(source: Path, folder: Path) -> Path:
     sink = RerunSink(recording.manifest, recording.world, path=path)
     for batch in recording.batches():
         sink.write(batch)
-    sink.close(whole=True)
+    sink.close(recording.result)
     return path
 
 
@@ -411,7 +411,7 @@ def test_browser_shows_the_run(tmp_path: Path) -> None:
     for batch in recording.batches():
         sink.write(batch)
     sink._rec.send_blueprint(layout.blueprint(recording.manifest, recording.world, live=True))
-    sink.close(whole=True)
+    sink.close(recording.result)
     end, last, png = time.monotonic() + 150, b"", b""
     with (
         served(tmp_path, run) as (_, address),

@@ -16,7 +16,7 @@ from brrt.formats.batching import Gathering
 from brrt.formats.mcap.cdr import Layout, definition
 from brrt.formats.mcap.container import Container
 from brrt.formats.mcap.records import sealed
-from brrt.replay.metrics import Metrics
+from brrt.recording import Result
 from brrt.scenario.manifest import Manifest
 from brrt.worlds.world import World
 
@@ -54,7 +54,6 @@ class McapSink:
 
     def __init__(self, path: Path | str, manifest: Manifest, world: World) -> None:
         self._path, self._epoch = Path(path), manifest.epoch_ns
-        self._metrics = Metrics(manifest)
         self._layouts = {kind: Layout.parse(definition(kind, manifest.dof)) for kind in Kind}
         self._gathering = Gathering(manifest.dof, _CHUNK_EVENTS, _CHUNK_SECONDS)
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
@@ -81,16 +80,15 @@ class McapSink:
         with self._failing():
             self._file.metadata(name, texts)
 
-    def close(self, *, whole: bool) -> None:
-        """Write what is pending, the figures, the index and the footer."""
+    def close(self, result: Result | None) -> None:
+        """Write what is pending, the result, the index and the footer."""
         if self._file.closed:
             return
         try:
             self._write_chunk(self._gathering.take())
             with self._failing():
-                if whole:
-                    figures = self._metrics.as_dict()
-                    texts = {name: json.dumps(value) for name, value in figures.items()}
+                if result is not None:
+                    texts = {name: json.dumps(value) for name, value in result.items()}
                     self._file.metadata(RESULT, sealed(texts))
                 self._file.finish()
         finally:
@@ -108,7 +106,6 @@ class McapSink:
     def _write_chunk(self, events: Events | None) -> None:
         if events is None:
             return
-        self._metrics.write(events)
         raw, times, channels, offsets = self._encode(events)
         with self._failing():
             self._file.chunk(raw, times, channels, offsets)

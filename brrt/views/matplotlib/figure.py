@@ -10,11 +10,14 @@ import numpy as np
 
 from brrt.errors import BrrtError, unknown
 from brrt.events import Kind
+from brrt.recording import Recording, check_limits
 from brrt.views.matplotlib import style
 from brrt.views.matplotlib.curves import Against, draw_cost, draw_time
 from brrt.views.matplotlib.draw_world import need_matplotlib, new_axes, save_figure
+from brrt.views.matplotlib.draw_world import plot as plot_world
 from brrt.views.matplotlib.history import Record
 from brrt.views.matplotlib.tree import TreePanel
+from brrt.worlds.world import World
 
 PANELS = ("tree", "cost", "time")
 _CURVE_HEIGHT, _SCALE_HEIGHT, _LEGEND_HEIGHT = 2.4, 0.65, 0.35
@@ -84,19 +87,32 @@ def save_plot(
         save_figure(figure, path, dpi=look.dpi)
 
 
-def plot(record: Record, ax: Any = None, *, what: str = "tree", rejects: int = 0) -> Any:
-    """Draw a run into axes, new ones by default; return the axes.
+def plot(
+    run: Recording | World,
+    ax: Any = None,
+    *,
+    what: str = "tree",
+    rejects: int = 0,
+    **until: int | None,
+) -> Any:
+    """Draw a run or a world by matplotlib into axes, new ones by default; return the axes.
 
     Args:
-        record: The run, up to the instant that is to be seen.
+        run: The run, or a world.
         ax: Axes of matplotlib, with projection "3d" for the tree in a world in 3D.
-        what: "tree" or "cost".
+        what: "tree", or "cost" for the cost of the best path.
         rejects: How many of the newest rejected extensions are drawn.
+        until: The instant, as `Events.until` takes it; the end by default.
 
     Raises:
-        BrrtError: matplotlib is missing, the axes are of no use for this, or there is no path.
+        BrrtError: matplotlib is missing, the axes do not fit, or there is no path.
     """
+    if isinstance(run, World):
+        return plot_world(run, ax)
     need_matplotlib()
+    check_limits(until, "ax", "what", "rejects")
+    events = run.events().until(**until)
+    record = Record(run.manifest.scenario.planner, run.manifest, run.world, events)
     if what not in PANELS[:2]:
         raise unknown("panel", what, PANELS[:2])
     with style.paper() if ax is None else nullcontext():

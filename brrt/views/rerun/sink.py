@@ -7,11 +7,11 @@ from typing import Any
 import rerun as rr
 
 from brrt.errors import WriteError
-from brrt.events import FIELDS, Events
+from brrt.events import FIELDS, Events, Kind
 from brrt.formats.batching import Gathering
 from brrt.formats.rrd.checksum import WRITTEN, stamp
 from brrt.formats.rrd.outline import CHECK, END, EVENTS, MANIFEST, OURS, WORLD, archetype
-from brrt.replay.metrics import Metrics
+from brrt.recording import Result
 from brrt.scenario.manifest import Manifest
 from brrt.views.rerun.arrow import event_columns, time_columns
 from brrt.views.rerun.draw.drawing import Drawing
@@ -59,7 +59,7 @@ class RerunSink:
     ) -> None:
         self._manifest, self._view = manifest, view
         self._path = None if path is None else Path(path)
-        self._metrics = Metrics(manifest)
+        self._counts = dict.fromkeys(Kind, 0)
         live = view or embed is not None
         self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if live else _FILE_S)
         self._chunk = max(256, _WINDOW // (8 * manifest.dof + 5))
@@ -94,7 +94,7 @@ class RerunSink:
         self._write(self._gathering.take())
         self._write_texts(f"{OURS}{name.rpartition('.')[2]}", texts)
 
-    def close(self, *, whole: bool) -> None:
+    def close(self, result: Result | None) -> None:
         """Write how it ended, and let go of file and viewer.
 
         Raises:
@@ -105,13 +105,11 @@ class RerunSink:
         try:
             self._write(self._gathering.take())
             self._drawing.close()
-            figures = self._metrics.as_dict()
-            end = {"events": str(figures["events"]), "stamp": WRITTEN}
-            if whole:
-                end["result"] = json.dumps(figures)
-                counts = self._metrics.counts
-                end["counts"] = json.dumps({kind.label: n for kind, n in counts.items()})
-                self._document(document(self._manifest, figures))
+            end = {"events": str(sum(self._counts.values())), "stamp": WRITTEN}
+            if result is not None:
+                end["result"] = json.dumps(result)
+                end["counts"] = json.dumps({kind.label: n for kind, n in self._counts.items()})
+                self._document(document(self._manifest, result))
             self._write_texts(END, end)
             if self._view:  # the file is to open at its beginning, though the viewer is at the end
                 self._rec.send_blueprint(self._layout, make_active=False)
@@ -134,7 +132,8 @@ class RerunSink:
             self._rec.send_columns(entity, time_columns(table), columns)
         self._flush()  # ahead of the drawing: a file that is cut there lacks none of these events
         self._drawing.write(events)
-        self._metrics.write(events)
+        for kind, count in events.counts.items():
+            self._counts[kind] += count
         self._hand_on()
 
     def _disconnect(self) -> None:
