@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from brrt import Robot, World, make_robot, make_world
 from brrt.kernels.jit import kernel
-from brrt.kernels.spaces.space import segment_free
+from brrt.kernels.space import segment_free
+from brrt.kernels.spaces import make_space
 from brrt.robots import Polygon
 
 Floats = NDArray[np.float64]
@@ -76,7 +77,7 @@ def main() -> None:
         for spec in WORLDS:
             world = make_world(spec)
             robot = unsettled.resolved(world)
-            space = robot.space(world)
+            space = make_space(robot, world)
             A, B = edges(robot, world, space, options.edges)
             free, times = np.zeros(len(A), np.bool_), []
             for _ in range(options.rounds):

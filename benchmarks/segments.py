@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from brrt import Grid, World, make_robot, make_world
 from brrt.kernels.jit import kernel
-from brrt.kernels.spaces.space import segment_free
+from brrt.kernels.space import segment_free
+from brrt.kernels.spaces import make_space
 
 Floats = NDArray[np.float64]
 
@@ -127,7 +128,7 @@ class Course:
     def __init__(self, row: Row, n: int) -> None:
         self.row = row
         self.world = row.world()
-        self.space: Any = make_robot("point").space(self.world)
+        self.space: Any = make_space(make_robot("point"), self.world)
         self.A, self.B = segments(self.world, n, row.longest)
         self.free = np.zeros(n, np.bool_)
         check_all(self.space, self.A[:1], self.B[:1], self.free)

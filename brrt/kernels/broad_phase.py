@@ -7,7 +7,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from brrt.kernels.jit import BORROWING, helper, inline_helper
-from brrt.kernels.occupancy import Cells, build_cells, segment_hits_cells
+from brrt.kernels.occupancy import ClearanceGrid, build_clearance_grid, segment_hits_cells
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ _TINY = 1e-290
 """A component of a segment below this counts as zero: its reciprocal would overflow."""
 
 
-class Obstacles(NamedTuple):
+class ObstacleGrid(NamedTuple):
     """Balls, boxes and convex polygons behind a grid.
 
     The tuples have one number an axis, so that kernels are compiled for the dimension.
@@ -56,7 +56,7 @@ class Obstacles(NamedTuple):
     boxes: Floats
     vertices: Floats
     corners: NDArray[np.int32]
-    cells: Cells
+    cells: ClearanceGrid
 
 
 def bounding_boxes(world: World) -> tuple[Floats, Floats]:
@@ -69,7 +69,7 @@ def bounding_boxes(world: World) -> tuple[Floats, Floats]:
     return np.concatenate(least), np.concatenate(most)
 
 
-def build_obstacles(world: World) -> Obstacles:
+def build_obstacle_grid(world: World) -> ObstacleGrid:
     """Enter a world's obstacles into a grid, about 8 cells an obstacle."""
     d = world.dim
     least, most = bounding_boxes(world)
@@ -97,7 +97,7 @@ def build_obstacles(world: World) -> Obstacles:
     per_length = tuple((1.0 / cell).tolist())
     ends = np.cumsum([0, *map(len, world.polygons)], dtype=np.int32)
     vertices = np.concatenate([np.empty((0, 2)), *world.polygons])
-    return Obstacles(
+    return ObstacleGrid(
         corner,
         edges,
         per_length,
@@ -108,7 +108,7 @@ def build_obstacles(world: World) -> Obstacles:
         world.boxes,
         vertices,
         ends,
-        build_cells(world),
+        build_clearance_grid(world),
     )
 
 
@@ -207,7 +207,7 @@ def _hits_hull(
     return True
 
 
-def _hits_polygon(o: Obstacles, polygon: int, line: tuple[float, float, float, float]) -> bool:
+def _hits_polygon(o: ObstacleGrid, polygon: int, line: tuple[float, float, float, float]) -> bool:
     """Whether the segment from (ax, ay) along (dx, dy) touches a polygon of a 2D world."""
     ax, ay, dx, dy = line
     return _hits_hull(o.vertices, o.corners[polygon], o.corners[polygon + 1], ax, ay, dx, dy)
@@ -225,7 +225,7 @@ def _by_dimension(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types ar
     return never
 
 
-def _hits_cells(o: Obstacles, line: tuple[float, float, float, float]) -> bool:
+def _hits_cells(o: ObstacleGrid, line: tuple[float, float, float, float]) -> bool:
     """Whether the segment from (ax, ay) along (dx, dy) touches a cell of a 2D world's grid."""
     ax, ay, dx, dy = line
     return len(o.cells.clearance) > 0 and segment_hits_cells(o.cells, ax, ay, dx, dy)
@@ -244,7 +244,7 @@ def _in_the_plane(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types ar
 
 
 @inline_helper
-def segment_hits(o: Obstacles, A: Floats, i: int, B: Floats, j: int) -> bool:
+def segment_hits(o: ObstacleGrid, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the closed segment from A[i] to B[j] touches an obstacle.
 
     Decided by formulas, not by sampling: slabs for boxes, the closest point for balls, separating

@@ -1,11 +1,11 @@
-"""Motions of bodies made of convex parts: free only if free everywhere on the way.
+"""Continuous collision checks of bodies made of convex parts.
 
 A motion is halved until each piece is decided (adaptive bisection; Schwarzer, Saha and Latombe
 2005). In the middle of a piece, separating axes give a lower bound of the distance between each
 part of the body and each obstacle nearby; the robot bounds how far any point of the part moves
-within the piece. Where the distance is larger, the whole piece is free. So nothing is sampled:
-whatever is called free is free at any finer resolution. What comes closer than `margin` to an
-obstacle is called a hit, which ends the halving.
+within the piece. If the distance is larger, the whole piece is free. Nothing is sampled, so a
+motion that is reported free is free at any resolution. A part that comes closer than `margin` to
+an obstacle is a hit, which ends the halving.
 """
 
 from typing import Any, NamedTuple
@@ -13,35 +13,38 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.kernels.broad_phase import Obstacles, bounding_boxes, build_obstacles
+from brrt.kernels.broad_phase import ObstacleGrid, bounding_boxes, build_obstacle_grid
 from brrt.kernels.jit import helper, inline_helper
-from brrt.kernels.spaces.space import by_robot
+from brrt.kernels.space import by_space
 from brrt.worlds.convex import axes_of
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 
+ROUND_UP = 1.0 + 1e-12
+"""Factor that covers the rounding of a bound on a movement."""
+
 _MARGIN = 1e-6
-"""Least clearance that is told from a touch, as a part of the map's longest side."""
+"""Least clearance that does not count as touching, as a part of the map's longest side."""
 
 _ROUNDING = 1e-14
 """Bound on the rounding of a placed vertex or of a separation, as a part of the largest
-coordinate and for each rotation that comes before: some 20 roundings of 1.1e-16."""
+coordinate and for each rotation on the way to it: about 20 roundings of 1.1e-16."""
 
 HIT, UNDECIDED, FREE = range(3)
-"""What is known of a piece of a motion."""
+"""Results of the check of a piece of a motion."""
 
 
-class Shapes(NamedTuple):
+class ConvexShapes(NamedTuple):
     """Convex shapes: hulls of vertices, inflated by a radius.
 
     Attributes:
-        vertices: Of all shapes, one after the other, shape (v, 2).
-        axes: Outward normals of their edges, and how far the shape reaches along them, shape
+        vertices: Vertices of all shapes, shape by shape, shape (v, 2).
+        axes: Outward normals of their edges, and the shape's greatest coordinate along each, shape
             (a, 3); see `brrt.worlds.convex.axes_of`.
-        first: Where each shape begins in `vertices` and in `axes`, and the end, shape (n + 1, 2).
-        circles: A circle around each shape, radius included: centre and radius, shape (n, 3).
-        radii: Radius that inflates each, shape (n,); above 0 for balls alone.
+        first: First row of each shape in `vertices` and in `axes`, and the end, shape (n + 1, 2).
+        circles: Centre and radius of a circle around each inflated shape, shape (n, 3).
+        radii: Radius that inflates each shape, shape (n,); above 0 for balls only.
     """
 
     vertices: Floats
@@ -51,14 +54,14 @@ class Shapes(NamedTuple):
     radii: Floats
 
 
-class Scenery(NamedTuple):
-    """A world's obstacles as shapes, and the grid that finds those nearby.
+class ConvexObstacles(NamedTuple):
+    """A 2D world's obstacles as convex shapes, and the grid that finds those nearby.
 
     Attributes:
-        shapes: Balls, boxes and polygons, in the order of the grid's numbers.
-        boxes: Box around each, shape (n, 4): least corner, greatest corner.
-        entry: First cell of each along both axes, shape (n, 2).
-        starts: Where each cell's entries begin in `items`, shape (cells + 1,).
+        shapes: Balls, boxes and polygons, in the order of the grid's obstacle numbers.
+        boxes: Bounding boxes, shape (n, 4): least corner, greatest corner.
+        entry: First cell of each obstacle along both axes, shape (n, 2).
+        starts: First entry of each cell in `items`, and the end, shape (cells + 1,).
         items: Obstacle numbers.
         lower: Least corner of the grid.
         per_length: Reciprocals of a cell's edges.
@@ -68,7 +71,7 @@ class Scenery(NamedTuple):
         rounding: Bound on the rounding of a distance.
     """
 
-    shapes: Shapes
+    shapes: ConvexShapes
     boxes: Floats
     entry: NDArray[np.int32]
     starts: NDArray[np.int32]
@@ -81,26 +84,26 @@ class Scenery(NamedTuple):
     rounding: float
 
 
-class Body(NamedTuple):
-    """What a motion's check works on. One space serves one thread: all of it is scratch.
+class MotionScratch(NamedTuple):
+    """Work space of the check of one motion; so a space serves one thread at a time.
 
     Attributes:
-        placed: The robot's parts at the pose that is looked at.
-        moves: How far any point of each part moves in the whole motion, shape (parts,).
-        pairs: Parts that must not meet each other, shape (m, 2).
-        pair_moves: How far any points of these move towards each other, shape (m,).
+        placed: The robot's parts at the pose that is checked.
+        moves: Bound on how far any point of each part moves in the motion, shape (parts,).
+        pairs: Parts that must not touch each other, shape (m, 2).
+        pair_moves: Bound on how far points of a pair move towards each other, shape (m,).
         near: Numbers of the obstacles nearby, shape (obstacles,).
     """
 
-    placed: Shapes
+    placed: ConvexShapes
     moves: Floats
     pairs: NDArray[np.int32]
     pair_moves: Floats
     near: NDArray[np.int32]
 
 
-def build_shapes(hulls: list[Floats], radii: list[float] | None = None) -> Shapes:
-    """Lay out shapes for the kernels; vertices counter-clockwise, shape (k, 2) each."""
+def build_shapes(hulls: list[Floats], radii: list[float] | None = None) -> ConvexShapes:
+    """Build shapes from their vertices, counter-clockwise, shape (k, 2) each."""
     corners = np.array([len(hull) for hull in hulls], np.int64)
     # A point has no axes, a line segment four, a polygon one for each side.
     sides = np.choose(np.minimum(corners, 3), [0, 0, 4, corners])
@@ -108,48 +111,48 @@ def build_shapes(hulls: list[Floats], radii: list[float] | None = None) -> Shape
     vertices = np.concatenate([np.empty((0, 2)), *hulls])
     axes, circles = np.empty((first[-1, 1], 3)), np.empty((len(hulls), 3))
     for k in np.unique(corners).tolist():
-        alike = np.flatnonzero(corners == k)
-        some = vertices[first[alike, :1] + np.arange(k)]
-        directions = axes_of(some)
-        reach = directions[:, :, None, 0] * some[:, None, :, 0]
-        reach = (reach + directions[:, :, None, 1] * some[:, None, :, 1]).max(axis=2)
-        places = first[alike, 1:] + np.arange(directions.shape[1])
-        axes[places] = np.concatenate([directions, reach[..., None]], axis=2)
-        # Around the middle of the bounding box: close to the smallest circle, and simple.
-        centres = (some.min(axis=1) + some.max(axis=1)) / 2
-        away = some - centres[:, None]
-        circles[alike, :2] = centres
-        circles[alike, 2] = np.hypot(away[..., 0], away[..., 1]).max(axis=1) * (1 + 1e-15)
+        same = np.flatnonzero(corners == k)
+        hulls_of_k = vertices[first[same, :1] + np.arange(k)]
+        directions = axes_of(hulls_of_k)
+        reach = directions[:, :, None, 0] * hulls_of_k[:, None, :, 0]
+        reach = (reach + directions[:, :, None, 1] * hulls_of_k[:, None, :, 1]).max(axis=2)
+        rows = first[same, 1:] + np.arange(directions.shape[1])
+        axes[rows] = np.concatenate([directions, reach[..., None]], axis=2)
+        # A circle around the bounding box's centre is close to the smallest one, and simple.
+        centres = (hulls_of_k.min(axis=1) + hulls_of_k.max(axis=1)) / 2
+        away = hulls_of_k - centres[:, None]
+        circles[same, :2] = centres
+        circles[same, 2] = np.hypot(away[..., 0], away[..., 1]).max(axis=1) * (1 + 1e-15)
     added = np.zeros(len(hulls)) if radii is None else np.array(radii, np.float64)
     circles[:, 2] += added
-    return Shapes(vertices, axes, first.astype(np.int32), circles, added)
+    return ConvexShapes(vertices, axes, first.astype(np.int32), circles, added)
 
 
 def build_body(
-    parts: list[Floats], scenery: Scenery, pairs: list[tuple[int, int]] | None = None
-) -> tuple[Shapes, Body]:
-    """Return a body's parts as the robot defines them, and room for the checks of its motions."""
-    shapes, forbidden = build_shapes(parts), np.array(pairs or [], np.int32).reshape(-1, 2)
-    body = Body(
+    parts: list[Floats], obstacles: ConvexObstacles, pairs: list[tuple[int, int]] | None = None
+) -> tuple[ConvexShapes, MotionScratch]:
+    """Return a body's parts in their own frames, and the work space of its motion checks."""
+    rows = np.array(pairs or [], np.int32).reshape(-1, 2)
+    scratch = MotionScratch(
         placed=build_shapes(parts),
         moves=np.zeros(len(parts)),
-        pairs=forbidden,
-        pair_moves=np.zeros(len(forbidden)),
-        near=np.zeros(len(scenery.boxes), np.int32),
+        pairs=rows,
+        pair_moves=np.zeros(len(rows)),
+        near=np.zeros(len(obstacles.boxes), np.int32),
     )
-    return shapes, body
+    return build_shapes(parts), scratch
 
 
-def build_scenery(world: World, reach: float, joints: int = 1) -> Scenery:
-    """Enter a 2D world's obstacles into a grid.
+def build_convex_obstacles(world: World, reach: float, joints: int = 1) -> ConvexObstacles:
+    """Build the convex obstacles of a 2D world and their grid.
 
     Args:
         world: The world.
-        reach: Farthest that the body's points come from its reference point.
-        joints: Rotations that follow each other from there to the last part.
+        reach: Farthest distance of the body's points from its reference point.
+        joints: Rotations between the reference point and the last part.
     """
     world = world.solid()
-    grid: Obstacles = build_obstacles(world)
+    grid: ObstacleGrid = build_obstacle_grid(world)
     hulls, radii = [ball[None, :2] for ball in world.balls], world.balls[:, 2].tolist()
     for a, b, c, d in world.boxes:
         corners = np.array([[a, b], [c, b], [c, d], [a, d]])
@@ -158,7 +161,7 @@ def build_scenery(world: World, reach: float, joints: int = 1) -> Scenery:
     radii += [0.0] * (len(hulls) - len(radii))
     largest = float(np.abs([world.lower, world.upper]).max()) + reach
     rounding = _ROUNDING * (1 + joints) * largest
-    return Scenery(
+    return ConvexObstacles(
         shapes=build_shapes(hulls, radii),
         boxes=np.concatenate(bounding_boxes(world), axis=1),
         entry=_first_cells(grid, len(hulls)),
@@ -173,8 +176,8 @@ def build_scenery(world: World, reach: float, joints: int = 1) -> Scenery:
     )
 
 
-def _first_cells(grid: Obstacles, n: int) -> NDArray[np.int32]:
-    """Least column and row of the cells that name each obstacle, shape (n, 2)."""
+def _first_cells(grid: ObstacleGrid, n: int) -> NDArray[np.int32]:
+    """Least column and row of the cells that list each obstacle, shape (n, 2)."""
     cells = np.repeat(np.arange(len(grid.starts) - 1), np.diff(grid.starts))
     entry = np.full((n, 2), np.iinfo(np.int32).max, np.int32)
     np.minimum.at(entry[:, 0], grid.items, (cells % grid.shape[0]).astype(np.int32))
@@ -182,23 +185,23 @@ def _first_cells(grid: Obstacles, n: int) -> NDArray[np.int32]:
     return entry
 
 
-@by_robot
+@by_space
 def place(space: Any, A: Floats, i: int, B: Floats, j: int, part: float) -> None:
-    """Put the body at a part (0 to 1) of the way from A[i] to B[j], into `space.body.placed`."""
+    """Place the body at a part (0 to 1) of the motion from A[i] to B[j] in `scratch.placed`."""
     space.place(space, A, i, B, j, part)
 
 
-@by_robot
+@by_space
 def bound_moves(space: Any, A: Floats, i: int, B: Floats, j: int) -> None:
-    """Bound how far the parts' points move on the way, into `moves` and `pair_moves`."""
+    """Write bounds on how far the parts' points move to `scratch.moves` and `pair_moves`."""
     space.bound_moves(space, A, i, B, j)
 
 
 @inline_helper
 def place_part(
-    parts: Shapes, placed: Shapes, part: int, x: float, y: float, cos: float, sin: float
+    parts: ConvexShapes, placed: ConvexShapes, part: int, x: float, y: float, cos: float, sin: float
 ) -> None:
-    """Turn a part about its own origin and move the origin to (x, y)."""
+    """Rotate a part about its own origin and move the origin to (x, y)."""
     for v in range(parts.first[part, 0], parts.first[part + 1, 0]):
         px, py = parts.vertices[v, 0], parts.vertices[v, 1]
         placed.vertices[v, 0] = x + (cos * px - sin * py)
@@ -214,8 +217,10 @@ def place_part(
 
 
 @inline_helper
-def _apart_along(one: Shapes, a: int, other: Shapes, b: int, best: float, enough: float) -> float:
-    """Greatest separation of shape b along the axes of shape a, radii aside, or just `enough`."""
+def _separation_along_axes(
+    one: ConvexShapes, a: int, other: ConvexShapes, b: int, best: float, enough: float
+) -> float:
+    """Greatest separation along the axes of shape a, without radii; the first above `enough`."""
     for axis in range(one.first[a, 1], one.first[a + 1, 1]):
         nx, ny = one.axes[axis, 0], one.axes[axis, 1]
         low = np.inf
@@ -228,8 +233,8 @@ def _apart_along(one: Shapes, a: int, other: Shapes, b: int, best: float, enough
 
 
 @inline_helper
-def _apart_from_centre(one: Shapes, a: int, x: float, y: float) -> float:
-    """Separation of a shape and a point along the direction of its nearest vertex."""
+def _separation_from_point(one: ConvexShapes, a: int, x: float, y: float) -> float:
+    """Separation of a shape and a point in the direction from the nearest vertex to the point."""
     nearest, nx, ny = np.inf, 0.0, 0.0
     for v in range(one.first[a, 0], one.first[a + 1, 0]):
         dx, dy = x - one.vertices[v, 0], y - one.vertices[v, 1]
@@ -246,20 +251,20 @@ def _apart_from_centre(one: Shapes, a: int, x: float, y: float) -> float:
 
 
 @inline_helper
-def _separation(one: Shapes, a: int, other: Shapes, b: int, enough: float) -> float:
-    """Lower bound of the distance of two shapes; exactness beyond `enough` is not sought."""
+def _separation(one: ConvexShapes, a: int, other: ConvexShapes, b: int, enough: float) -> float:
+    """Lower bound of the distance of two shapes; one above `enough` need not be the best."""
     radius, first = other.radii[b], other.first[b, 0]
-    best = _apart_along(other, b, one, a, -np.inf, enough + radius)
+    best = _separation_along_axes(other, b, one, a, -np.inf, enough + radius)
     if best <= enough + radius:
-        best = _apart_along(one, a, other, b, best, enough + radius)
+        best = _separation_along_axes(one, a, other, b, best, enough + radius)
     if best <= enough + radius and other.first[b + 1, 0] - first == 1:
         x, y = other.vertices[first, 0], other.vertices[first, 1]
-        best = max(best, _apart_from_centre(one, a, x, y))
+        best = max(best, _separation_from_point(one, a, x, y))
     return float(best - radius)
 
 
 @inline_helper
-def _may_meet(one: Shapes, a: int, other: Shapes, b: int, reach: float) -> bool:
+def _may_meet(one: ConvexShapes, a: int, other: ConvexShapes, b: int, reach: float) -> bool:
     """Whether the circles around two shapes come closer than `reach`."""
     dx = one.circles[a, 0] - other.circles[b, 0]
     dy = one.circles[a, 1] - other.circles[b, 1]
@@ -268,19 +273,19 @@ def _may_meet(one: Shapes, a: int, other: Shapes, b: int, reach: float) -> bool:
 
 
 @helper
-def _decide(body: Body, scenery: Scenery, count: int, half: float) -> int:
-    """Decide about the piece of a motion whose middle is placed and which is 2 `half` of it long.
+def _decide(scratch: MotionScratch, obstacles: ConvexObstacles, count: int, half: float) -> int:
+    """Check the piece of a motion in whose middle the body is placed: HIT, UNDECIDED or FREE.
 
     Args:
-        body: The body, placed; `count` obstacles in `near`.
-        scenery: What is in the way.
-        count: Obstacles nearby.
-        half: Half the piece, as a part of the motion.
+        scratch: The placed body, and the obstacles nearby.
+        obstacles: All obstacles.
+        count: Number of obstacles nearby.
+        half: Half the length of the piece, as a part of the motion.
     """
-    placed, margin, result = body.placed, scenery.margin + scenery.rounding, FREE
-    x0, y0, x1, y1 = scenery.walls
-    for part in range(len(body.moves)):
-        reach = body.moves[part] * half + scenery.rounding
+    placed, margin, result = scratch.placed, obstacles.margin + obstacles.rounding, FREE
+    x0, y0, x1, y1 = obstacles.walls
+    for part in range(len(scratch.moves)):
+        reach = scratch.moves[part] * half + obstacles.rounding
         room = np.inf
         for v in range(placed.first[part, 0], placed.first[part + 1, 0]):
             x, y = placed.vertices[v, 0], placed.vertices[v, 1]
@@ -291,17 +296,17 @@ def _decide(body: Body, scenery: Scenery, count: int, half: float) -> int:
             result = UNDECIDED
         enough = max(reach, margin)
         for at in range(count):
-            other = body.near[at]
-            if not _may_meet(placed, part, scenery.shapes, other, enough):
+            other = scratch.near[at]
+            if not _may_meet(placed, part, obstacles.shapes, other, enough):
                 continue
-            apart = _separation(placed, part, scenery.shapes, other, enough)
+            apart = _separation(placed, part, obstacles.shapes, other, enough)
             if apart <= margin:
                 return HIT
             if apart <= reach:
                 result = UNDECIDED
-    for pair in range(len(body.pair_moves)):
-        one, two = body.pairs[pair, 0], body.pairs[pair, 1]
-        reach = body.pair_moves[pair] * half + 2 * scenery.rounding
+    for pair in range(len(scratch.pair_moves)):
+        one, two = scratch.pairs[pair, 0], scratch.pairs[pair, 1]
+        reach = scratch.pair_moves[pair] * half + 2 * obstacles.rounding
         enough = max(reach, margin)
         if not _may_meet(placed, one, placed, two, enough):
             continue
@@ -319,37 +324,39 @@ def _cell(offset: float, per_length: float, count: int) -> int:
 
 
 @helper
-def _gather(body: Body, scenery: Scenery) -> int:
-    """List the obstacles that the placed body may meet in the whole motion; return how many."""
-    placed = body.placed
+def _gather(scratch: MotionScratch, obstacles: ConvexObstacles) -> int:
+    """List the obstacles that the body may meet in the whole motion; return their number.
+
+    The body is placed in the middle of the motion.
+    """
+    placed = scratch.placed
     x0, y0, x1, y1 = np.inf, np.inf, -np.inf, -np.inf
-    for part in range(len(body.moves)):
-        # The body stands in the middle of the motion.
-        reach = 0.5 * body.moves[part] + scenery.margin + 2 * scenery.rounding
+    for part in range(len(scratch.moves)):
+        reach = 0.5 * scratch.moves[part] + obstacles.margin + 2 * obstacles.rounding
         for v in range(placed.first[part, 0], placed.first[part + 1, 0]):
             x, y = placed.vertices[v, 0], placed.vertices[v, 1]
             x0, y0 = min(x0, x - reach), min(y0, y - reach)
             x1, y1 = max(x1, x + reach), max(y1, y + reach)
-    (left, low), (per_x, per_y) = scenery.lower, scenery.per_length
-    columns, rows = scenery.counts
+    (left, low), (per_x, per_y) = obstacles.lower, obstacles.per_length
+    columns, rows = obstacles.counts
     first, last = _cell(x0 - left, per_x, columns), _cell(x1 - left, per_x, columns)
     bottom, top = _cell(y0 - low, per_y, rows), _cell(y1 - low, per_y, rows)
     n = 0
     for cy in range(bottom, top + 1):
         for cx in range(first, last + 1):
             cell = cx + columns * cy
-            for entry in range(scenery.starts[cell], scenery.starts[cell + 1]):
-                item = scenery.items[entry]
-                # Each obstacle is taken once: from the first cell that it shares with the body.
-                if max(scenery.entry[item, 0], first) != cx:
+            for entry in range(obstacles.starts[cell], obstacles.starts[cell + 1]):
+                item = obstacles.items[entry]
+                # Take each obstacle once: from the first cell that it shares with the body's box.
+                if max(obstacles.entry[item, 0], first) != cx:
                     continue
-                if max(scenery.entry[item, 1], bottom) != cy:
+                if max(obstacles.entry[item, 1], bottom) != cy:
                     continue
-                if scenery.boxes[item, 0] > x1 or scenery.boxes[item, 2] < x0:
+                if obstacles.boxes[item, 0] > x1 or obstacles.boxes[item, 2] < x0:
                     continue
-                if scenery.boxes[item, 1] > y1 or scenery.boxes[item, 3] < y0:
+                if obstacles.boxes[item, 1] > y1 or obstacles.boxes[item, 3] < y0:
                     continue
-                body.near[n] = item
+                scratch.near[n] = item
                 n += 1
     return n
 
@@ -358,17 +365,17 @@ def _gather(body: Body, scenery: Scenery) -> int:
 def motion_free(space: Any, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the motion from A[i] to B[j] is free everywhere, ends included.
 
-    Pieces are numbered from the end of the motion, because that is where obstacles are: planners
-    move on from where they know it is free.
+    Pieces are checked from the end of the motion, because a planner's motions start in free space,
+    so a collision is more likely near the end.
     """
-    body, scenery = space.body, space.scenery
+    scratch, obstacles = space.scratch, space.obstacles
     bound_moves(space, A, i, B, j)
     count, level, piece, half = -1, 0, 0, 0.5
     while True:
         place(space, A, i, B, j, 1.0 - (2 * piece + 1) * half)
         if count < 0:
-            count = _gather(body, scenery)
-        found = _decide(body, scenery, count, half)
+            count = _gather(scratch, obstacles)
+        found = _decide(scratch, obstacles, count, half)
         if found == HIT:
             return False
         if found == FREE:

@@ -9,7 +9,7 @@ from brrt.events import Kind
 from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
 from brrt.kernels.jit import inline_helper
 from brrt.kernels.kdtree import KdTree, grown_kdtree, has_room, insert, rooted_kdtree
-from brrt.kernels.spaces.space import distance
+from brrt.kernels.space import distance
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ config: Any = _config
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parents[1]
-_SOURCES = ("events.py", "kernels", "robots", "planners")
+_SOURCES = ("events.py", "kernels", "planners")
 
 
 def _sources_digest() -> str:

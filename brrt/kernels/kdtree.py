@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.kernels.jit import helper, inline_helper
-from brrt.kernels.spaces.space import box_measure, length, measure
+from brrt.kernels.space import box_measure, length, measure
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brrt.events import Kind, Reason, Stage
 from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
 from brrt.kernels.jit import helper, inline_helper
-from brrt.kernels.spaces.space import distance, segment_free
+from brrt.kernels.space import distance, segment_free
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -16,7 +16,7 @@ _SLACK = 4e-15
 roundings of 1.1e-16 on the way to the grid's axes, and four along the segment."""
 
 
-class Cells(NamedTuple):
+class ClearanceGrid(NamedTuple):
     """An occupancy grid.
 
     Attributes:
@@ -29,14 +29,14 @@ class Cells(NamedTuple):
     frame: tuple[float, float, float, float, float]
 
 
-def build_cells(world: World) -> Cells:
+def build_clearance_grid(world: World) -> ClearanceGrid:
     """Find how far each cell of a world's grid is from blocked ones.
 
     Where the world reaches beyond the grid, a ring of blocked cells stands for all outside.
     """
     grid = world.grid
     if grid is None:
-        return Cells(np.empty((0, 0), np.uint8), (0.0, 0.0, 1.0, 0.0, 1.0))
+        return ClearanceGrid(np.empty((0, 0), np.uint8), (0.0, 0.0, 1.0, 0.0, 1.0))
     taken, origin = grid.cells, grid.origin
     if not grid.reaches_all_of(world.lower, world.upper):
         taken, origin = (
@@ -48,7 +48,7 @@ def build_cells(world: World) -> Cells:
         taken = _wider(taken)
         clearance += ~taken
     cos, sin = grid.axes
-    return Cells(clearance, (*origin.tolist(), cos, sin, 1.0 / grid.resolution))
+    return ClearanceGrid(clearance, (*origin.tolist(), cos, sin, 1.0 / grid.resolution))
 
 
 def _wider(taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -67,7 +67,7 @@ def _cell(at: float, count: int) -> int:
 
 
 @helper
-def segment_hits_cells(cells: Cells, ax: float, ay: float, dx: float, dy: float) -> bool:
+def segment_hits_cells(cells: ClearanceGrid, ax: float, ay: float, dx: float, dy: float) -> bool:
     """Whether the closed segment from (ax, ay) along (dx, dy) touches a blocked cell.
 
     The segment is walked along its longer side, column by column; a corner that it passes belongs

@@ -17,7 +17,7 @@ from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
 from brrt.kernels.jit import helper, inline_helper, kernel
 from brrt.kernels.kdtree import near, nearest
 from brrt.kernels.random import Random, uniform
-from brrt.kernels.spaces.space import distance, sample_informed, sample_uniform, segment_free, steer
+from brrt.kernels.space import distance, sample_informed, sample_uniform, segment_free, steer
 from brrt.planners.base.kernel_planner import (
     BATCH_FULL,
     COUNTED,

@@ -104,8 +104,8 @@ def proven_gamma(problem: Problem) -> float:
     Karaman and Frazzoli 2011, theorem 38: (2 (1 + 1/d) V / B)^(1/d), where V is the volume of free
     space, here that of the bounds, which is no less, and B that of the robot's unit ball.
     """
-    d, space = problem.dof, problem.space
-    volume = math.prod(high - low for low, high in zip(space.lower, space.upper, strict=True))
+    d, (lower, upper) = problem.dof, problem.robot.bounds(problem.world)
+    volume = math.prod((upper - lower).tolist())
     ball = problem.robot.unit_ball_volume(problem.world)
     return float(1.1 * (2 * (1 + 1 / d) * volume / ball) ** (1 / d))
 

@@ -1,4 +1,4 @@
-"""Robots: one file and one line here adds one."""
+"""Robots in numpy: one file and one line here for each, and its counterpart in kernels/spaces."""
 
 import json
 from collections.abc import Mapping
@@ -18,13 +18,13 @@ _MAX_BYTES = 16_000_000
 
 
 def make_robot(spec: str) -> Robot:
-    """Make the robot that a user names.
+    """Make a robot from its specification.
 
     Args:
         spec: A name with parameters, such as `polygon:length=4,width=2`, or a JSON file.
 
     Raises:
-        BrrtError: There is no such robot, or it is not usable.
+        BrrtError: The robot is unknown, or a parameter is invalid.
     """
     if names_robot_file(spec):
         return load_robot(Path(spec))
@@ -35,7 +35,7 @@ def make_robot(spec: str) -> Robot:
 
 
 def names_robot_file(spec: str) -> bool:
-    """Whether a user means a file: it may be missing by now."""
+    """Whether a specification names a file, which need not exist."""
     if spec.partition(":")[0] in ROBOTS:
         return False
     return spec.endswith(".json") or "/" in spec or (bool(spec) and Path(spec).is_file())
@@ -45,7 +45,7 @@ def load_robot(path: Path) -> Robot:
     """Read a robot from a JSON file.
 
     Raises:
-        BrrtError: The file cannot be read, or is not a robot.
+        BrrtError: The file cannot be read, or does not define a robot.
     """
     text = read_text(path, "a robot", _MAX_BYTES)
     try:
@@ -55,10 +55,10 @@ def load_robot(path: Path) -> Robot:
 
 
 def robot_from_json(text: str) -> Robot:
-    """Read what `Robot.to_json` wrote.
+    """Read the text that `Robot.to_json` wrote.
 
     Raises:
-        BrrtError: The text is not such a robot.
+        BrrtError: The text does not define a robot.
     """
     try:
         data = json.loads(text)

@@ -3,132 +3,25 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.kernels.convex import Body, Scenery, Shapes, build_body, build_scenery, motion_free
-from brrt.kernels.convex import place_part as place_shape
-from brrt.kernels.jit import inline_helper
-from brrt.robots.angles import (
-    all_wrapped,
-    angle_apart,
-    angle_to_range,
-    angles_apart,
-    rotation,
-    turn_between,
-    turns_between,
-    wrapped,
-)
-from brrt.robots.robot import Robot, blocked, check_fields, plane_only
+from brrt.robots.angles import angle_differences, angle_distances, rotation, wrap_angles
+from brrt.robots.robot import Floats, Robot, blocked, check_fields, plane_only
 from brrt.settings import param
 from brrt.worlds.convex import convex_polygon
 from brrt.worlds.world import World
-
-Floats = NDArray[np.float64]
-
-_SAFE = 1.0 + 1e-12
-"""Makes up for the rounding of a bound on a movement."""
-
-
-class PolygonSpace(NamedTuple):
-    """Poses of a polygon; see `brrt.kernels.spaces.space` for what the kernels mean.
-
-    Attributes:
-        lower: Least x, y, theta.
-        upper: Greatest x, y, theta.
-        radius: Farthest vertex from the reference point.
-        parts: The body at pose (0, 0, 0).
-        reach: Farthest vertex of each part from the reference point, shape (parts,).
-        scenery: What is in the way.
-        body: Scratch of the motion check.
-    """
-
-    lower: tuple[float, float, float]
-    upper: tuple[float, float, float]
-    radius: float
-    parts: Shapes
-    reach: Floats
-    scenery: Scenery
-    body: Body
-
-    @staticmethod
-    @inline_helper
-    def measure(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int) -> float:
-        """Distance of the reference points, and the way of the farthest vertex about its own."""
-        dx, dy = B[j, 0] - A[i, 0], B[j, 1] - A[i, 1]
-        return math.sqrt(dx * dx + dy * dy) + space.radius * angle_apart(A[i, 2], B[j, 2])
-
-    @staticmethod
-    @inline_helper
-    def length(space: "PolygonSpace", measured: float) -> float:  # noqa: ARG004
-        """It is a distance already."""
-        return measured
-
-    @staticmethod
-    @inline_helper
-    def box_measure(space: "PolygonSpace", boxes: Floats, b: int, Q: Floats, i: int) -> float:
-        """Distance to the box in the plane, and to its range of angles either way round."""
-        dx = max(0.0, boxes[b, 0] - Q[i, 0], Q[i, 0] - boxes[b, 3])
-        dy = max(0.0, boxes[b, 1] - Q[i, 1], Q[i, 1] - boxes[b, 4])
-        turn = angle_to_range(boxes[b, 2], boxes[b, 5], Q[i, 2])
-        return math.sqrt(dx * dx + dy * dy) + space.radius * turn
-
-    @staticmethod
-    @inline_helper
-    def interpolate(
-        space: "PolygonSpace",
-        A: Floats,
-        i: int,
-        B: Floats,
-        j: int,
-        part: float,
-        out: Floats,
-        row: int,
-    ) -> None:
-        """Move straight, and turn evenly the short way round."""
-        theta = wrapped(A[i, 2] + turn_between(A[i, 2], B[j, 2]) * part)
-        for k in range(2):
-            q = A[i, k] + (B[j, k] - A[i, k]) * part
-            out[row, k] = min(max(q, space.lower[k]), space.upper[k])
-        out[row, 2] = theta
-
-    @staticmethod
-    @inline_helper
-    def segment_free(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int) -> bool:
-        """Free everywhere on the way: see `brrt.kernels.convex`."""
-        return motion_free(space, A, i, B, j)
-
-    @staticmethod
-    @inline_helper
-    def place(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int, part: float) -> None:
-        """Turn all parts about the reference point."""
-        x = A[i, 0] + (B[j, 0] - A[i, 0]) * part
-        y = A[i, 1] + (B[j, 1] - A[i, 1]) * part
-        theta = A[i, 2] + turn_between(A[i, 2], B[j, 2]) * part
-        cos, sin = math.cos(theta), math.sin(theta)
-        for shape in range(len(space.reach)):
-            place_shape(space.parts, space.body.placed, shape, x, y, cos, sin)
-
-    @staticmethod
-    @inline_helper
-    def bound_moves(space: "PolygonSpace", A: Floats, i: int, B: Floats, j: int) -> None:
-        """As the metric, with each part's own radius."""
-        dx, dy = B[j, 0] - A[i, 0], B[j, 1] - A[i, 1]
-        straight, turn = math.sqrt(dx * dx + dy * dy), angle_apart(A[i, 2], B[j, 2])
-        for part in range(len(space.reach)):
-            space.body.moves[part] = (straight + space.reach[part] * turn) * _SAFE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygon(Robot):
     """A body of convex polygons in the plane; its configuration is x, y and the angle theta.
 
-    The metric is hypot(dx, dy) + radius |dtheta|, radius being the largest distance of a vertex
+    The metric is hypot(dx, dy) + radius |dtheta|, where radius is the largest distance of a vertex
     from the reference point: no point of the body moves farther. theta wraps at +-pi. Without a
-    file it is a rectangle about its reference point.
+    file the body is a rectangle centred on its reference point.
 
     Attributes:
         parts: The body at pose (0, 0, 0), vertices counter-clockwise, shape (k, 2) each.
@@ -141,7 +34,7 @@ class Polygon(Robot):
     parts: tuple[Floats, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
-        """Check the parts; without any, make the rectangle.
+        """Check the parts; if there are none, make the rectangle.
 
         Raises:
             BrrtError: A part is not a convex polygon.
@@ -167,9 +60,11 @@ class Polygon(Robot):
     @property
     def radius(self) -> float:
         """Largest distance of a vertex from the reference point."""
-        return float(self._reaches().max())
+        return float(self.reaches.max())
 
-    def _reaches(self) -> Floats:
+    @property
+    def reaches(self) -> Floats:
+        """Distance of each part's farthest vertex from the reference point, shape (parts,)."""
         return np.array([np.hypot(*part.T).max() for part in self.parts])
 
     def resolved(self, world: World) -> Self:
@@ -178,17 +73,12 @@ class Polygon(Robot):
         return self
 
     def coordinates(self, world: World) -> tuple[str, ...]:  # noqa: ARG002
-        """Where the reference point is, and the angle."""
+        """Position of the reference point, and the angle."""
         return ("x", "y", "theta")
 
-    def space(self, world: World) -> PolygonSpace:
-        """See `Robot.space`."""
-        plane_only(self.kind, world)
-        scenery = build_scenery(world, self.radius)
-        parts, body = build_body(list(self.parts), scenery)
-        (x0, y0), (x1, y1) = world.lower.tolist(), world.upper.tolist()
-        lower, upper = (x0, y0, -math.pi), (x1, y1, math.pi)
-        return PolygonSpace(lower, upper, self.radius, parts, self._reaches(), scenery, body)
+    def bounds(self, world: World) -> tuple[Floats, Floats]:
+        """See `Robot.bounds`."""
+        return np.append(world.lower, -math.pi), np.append(world.upper, math.pi)
 
     def collision(self, world: World, q: Floats) -> str | None:
         """See `Robot.collision`."""
@@ -201,14 +91,14 @@ class Polygon(Robot):
         a, b = np.asarray(a), np.asarray(b)
         step = b[..., :2] - a[..., :2]
         straight = np.sqrt(step[..., 0] * step[..., 0] + step[..., 1] * step[..., 1])
-        return np.asarray(straight + self.radius * angles_apart(a[..., 2], b[..., 2]))
+        return np.asarray(straight + self.radius * angle_distances(a[..., 2], b[..., 2]))
 
     def interpolate(self, a: Floats, b: Floats, part: Floats | float) -> Floats:
         """See `Robot.interpolate`."""
         part = np.asarray(part)[..., None]
-        step = np.concatenate([b[:2] - a[:2], turns_between(a[2:], b[2:])])
+        step = np.concatenate([b[:2] - a[:2], angle_differences(a[2:], b[2:])])
         q = a + step * part
-        q[..., 2] = all_wrapped(q[..., 2])
+        q[..., 2] = wrap_angles(q[..., 2])
         return q
 
     def unit_ball_volume(self, world: World) -> float:  # noqa: ARG002
@@ -216,27 +106,27 @@ class Polygon(Robot):
         return 2 * math.pi / (3 * self.radius)
 
     def places(self, Q: Floats) -> Floats:
-        """Where the reference point is."""
+        """The reference point."""
         return Q[:, :2]
 
     def outline(self, q: Floats) -> list[Floats]:
         """See `Robot.outline`."""
-        turn = rotation(q[2])
-        return [part @ turn + q[:2] for part in self.parts]
+        matrix = rotation(q[2])
+        return [part @ matrix + q[:2] for part in self.parts]
 
     def configuration(self, position: Floats) -> Floats:
-        """Upright at the position."""
+        """The reference point at the position, with theta 0."""
         return np.array([*position, 0.0])
 
     def position(self, q: Floats) -> Floats:
-        """Where the reference point is."""
+        """The reference point."""
         return q[:2]
 
     @property
-    def room(self) -> float:
-        """See `Robot.room`."""
+    def reach(self) -> float:
+        """See `Robot.reach`."""
         return self.radius
 
     def canonical(self, q: Floats) -> Floats:
         """See `Robot.canonical`."""
-        return np.concatenate([q[:2], all_wrapped(q[2:])])
+        return np.concatenate([q[:2], wrap_angles(q[2:])])

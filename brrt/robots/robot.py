@@ -1,4 +1,4 @@
-"""What every robot is: a body, a metric, and a configuration space in any world that suits it."""
+"""The base of every robot: a body, a metric, and the checks of one configuration, in numpy."""
 
 import json
 from abc import abstractmethod
@@ -22,6 +22,8 @@ SCHEMA, VERSION = "brrt.robot", 1
 class Robot(Settings):
     """Base class: settings, and what they mean in a world.
 
+    `brrt.kernels.spaces` has the compiled counterpart of each robot.
+
     Attributes:
         kind: The robot's name in the registry and in files.
     """
@@ -29,10 +31,10 @@ class Robot(Settings):
     kind: ClassVar[str]
 
     def resolved(self, world: World) -> Self:  # noqa: ARG002
-        """Return the robot with everything decided that its settings leave to the world.
+        """Return the robot with the settings filled in whose defaults depend on the world.
 
         Raises:
-            BrrtError: The robot cannot be in this world.
+            BrrtError: The robot does not work in this world.
         """
         return self
 
@@ -45,15 +47,12 @@ class Robot(Settings):
         return len(self.coordinates(world))
 
     @abstractmethod
-    def space(self, world: World) -> Any:
-        """Put the robot into a world: its configuration space, as kernels see it.
-
-        A space may hold scratch: it serves one thread at a time.
-        """
+    def bounds(self, world: World) -> tuple[Floats, Floats]:
+        """Least and greatest configuration, shape (dof,) each; samples are drawn between them."""
 
     @abstractmethod
     def collision(self, world: World, q: Floats) -> str | None:
-        """Say why a configuration, shape (dof,), is not free, or return None."""
+        """Say why a configuration, shape (dof,), is not free, or return None if it is."""
 
     @abstractmethod
     def distance(self, a: Floats, b: Floats) -> Floats:
@@ -69,29 +68,29 @@ class Robot(Settings):
 
     @abstractmethod
     def places(self, Q: Floats) -> Floats:
-        """Where configurations, shape (n, dof), are drawn, shape (n, d)."""
+        """Points at which configurations, shape (n, dof), are drawn, shape (n, d)."""
 
     @abstractmethod
     def outline(self, q: Floats) -> list[Floats]:
-        """Return the parts of the body at a configuration, vertices counter-clockwise, (k, 2) each.
+        """Parts of the body at a configuration, vertices counter-clockwise, shape (k, 2) each.
 
-        Empty where the body is a point.
+        Empty if the body is a point.
         """
 
     @abstractmethod
     def configuration(self, position: Floats) -> Floats | None:
-        """Return the configuration at a position that a world suggests; None if there is none."""
+        """Configuration at a position in the world; None if a position does not determine one."""
 
     @abstractmethod
     def position(self, q: Floats) -> Floats | None:
-        """Return the position that a world should keep free for a configuration, if there is one.
+        """Position around which a generated world leaves room for a configuration, if there is one.
 
-        Numbers that are of no use as a configuration are the query's to refuse.
+        `q` may be invalid; the query is checked later.
         """
 
     @property
-    def room(self) -> float:
-        """How far the body reaches from such a position."""
+    def reach(self) -> float:
+        """Farthest distance of the body from `position`."""
         return 0.0
 
     def canonical(self, q: Floats) -> Floats:
@@ -99,11 +98,11 @@ class Robot(Settings):
         return q
 
     def along(self, path: Floats, count: int) -> Floats:
-        """Return configurations on a path, evenly by the metric, between its ends.
+        """Return configurations on a path, evenly spaced by the metric, without its ends.
 
         Args:
             path: Waypoints, shape (m, dof), m at least 1.
-            count: How many.
+            count: Number of configurations.
 
         Returns:
             Shape (count, dof).
@@ -111,30 +110,31 @@ class Robot(Settings):
         far = np.cumsum(np.concatenate([[0.0], self.distance(path[:-1], path[1:])]))
         if far[-1] <= 0:
             return np.repeat(path[:1], count, axis=0)
-        ways = np.linspace(0, far[-1], count + 2)[1:-1]
-        legs = np.clip(np.searchsorted(far, ways, "right") - 1, 0, len(path) - 2)
-        parts = (ways - far[legs]) / np.maximum(far[legs + 1] - far[legs], np.finfo(float).tiny)
-        on_way = [
-            self.interpolate(path[leg], path[leg + 1], min(part, 1.0))
-            for leg, part in zip(legs.tolist(), parts.tolist(), strict=True)
-        ]
-        return np.array(on_way)
+        at = np.linspace(0, far[-1], count + 2)[1:-1]
+        legs = np.clip(np.searchsorted(far, at, "right") - 1, 0, len(path) - 2)
+        parts = (at - far[legs]) / np.maximum(far[legs + 1] - far[legs], np.finfo(float).tiny)
+        return np.array(
+            [
+                self.interpolate(path[leg], path[leg + 1], min(part, 1.0))
+                for leg, part in zip(legs.tolist(), parts.tolist(), strict=True)
+            ]
+        )
 
     def definition(self) -> dict[str, Any]:
-        """Return what a file says of the robot, beyond its kind; `from_definition` reads it."""
+        """Return the fields of the robot's file, without its kind; see `from_definition`."""
         return self.as_dict()
 
     @classmethod
     def from_definition(cls, data: Mapping[str, Any]) -> Self:
-        """Make the robot that a file defines.
+        """Make the robot from the fields that `definition` returned.
 
         Raises:
-            BrrtError: A field is missing or of no use.
+            BrrtError: A field is missing, unknown or invalid.
         """
         return cls.parse(f"robot {cls.kind}", data)
 
     def to_json(self) -> str:
-        """Return the robot as text that `brrt.robots.robot_from_json` reads back."""
+        """Return the robot as text that `brrt.robots.robot_from_json` reads."""
         data = {"schema": SCHEMA, "version": VERSION, "kind": self.kind, **self.definition()}
         return json.dumps(data)
 
@@ -143,7 +143,7 @@ def numbers_of(name: str, values: Any, count: int) -> tuple[float, ...]:
     """Read `count` finite numbers.
 
     Raises:
-        BrrtError: They are something else.
+        BrrtError: The values are something else.
     """
     what = "a finite number" if count == 1 else f"{count} finite numbers"
     try:
@@ -151,15 +151,17 @@ def numbers_of(name: str, values: Any, count: int) -> tuple[float, ...]:
     except (TypeError, ValueError, OverflowError):
         array = np.array(np.nan)
     if array.shape != (count,) or not np.isfinite(array).all():
-        raise BrrtError(f"robot: {name} must be {what}, not {_short(values)}")
+        text = repr(values)
+        text = text if len(text) <= 60 else text[:57] + "..."
+        raise BrrtError(f"robot: {name} must be {what}, not {text}")
     return tuple(array.tolist())
 
 
 def check_fields(data: Mapping[str, Any], where: str, needed: tuple[str, ...], *more: str) -> None:
-    """See that a part of a file has the fields it needs, and no others.
+    """Check that an object of a file has the needed fields, and no others but `more`.
 
     Raises:
-        BrrtError: It has not.
+        BrrtError: A field is missing or unknown.
     """
     if not isinstance(data, Mapping):
         raise BrrtError(f"robot: {where} must be an object with {', '.join(needed)}")
@@ -169,14 +171,14 @@ def check_fields(data: Mapping[str, Any], where: str, needed: tuple[str, ...], *
     for name in data:
         if name not in (*needed, *more):
             known = ", ".join((*needed, *more))
-            raise BrrtError(f"robot: unknown field {name!r} of {where}; there is: {known}")
+            raise BrrtError(f"robot: unknown field {name!r} of {where}; known fields: {known}")
 
 
 def plane_only(kind: str, world: World) -> None:
-    """Refuse worlds that are not 2D.
+    """Check that a world is 2D.
 
     Raises:
-        BrrtError: The world is in 3D.
+        BrrtError: The world is 3D.
     """
     if world.dim != 2:
         raise BrrtError(
@@ -186,7 +188,7 @@ def plane_only(kind: str, world: World) -> None:
 
 
 def blocked(world: World, parts: list[Floats]) -> str | None:
-    """Say what a body touches: a wall or an obstacle; None if it touches nothing."""
+    """Say what a body touches, a bound or an obstacle; None if it touches nothing."""
     for part in parts:
         if (part <= world.lower).any() or (part >= world.upper).any():
             return "reaches the bounds"
@@ -194,8 +196,3 @@ def blocked(world: World, parts: list[Floats]) -> str | None:
         if hit is not None:
             return f"is in collision with {hit}"
     return None
-
-
-def _short(values: Any) -> str:
-    text = repr(values)
-    return text if len(text) <= 60 else text[:57] + "..."

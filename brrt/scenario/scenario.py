@@ -212,7 +212,7 @@ class Scenario:
         ends = [q if q is None else _NOWHERE if isinstance(q, str) else np.array(q) for q in given]
         if world is None:
             first, last = (None if q is None else robot.position(q) for q in ends)
-            world = make_world(self.world, first, last, robot.room)
+            world = make_world(self.world, first, last, robot.reach)
         for place, name in enumerate(("start", "goal")):
             if isinstance(given[place], str):
                 rng = np.random.Generator(np.random.PCG64([self.seed, place + 1]))

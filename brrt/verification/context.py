@@ -158,7 +158,7 @@ class Context:
                 (first, ruling.make_planner().contract(problem))
                 for first, ruling in manifest.stretches
             )
-        bounds = np.array(problem.space.lower), np.array(problem.space.upper)
+        bounds = problem.robot.bounds(world)
         return cls(
             manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
             problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off, figures,

@@ -12,7 +12,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from brrt.kernels.broad_phase import Obstacles, build_obstacles, segment_hits
+from brrt.kernels.broad_phase import ObstacleGrid, build_obstacle_grid, segment_hits
 from brrt.kernels.jit import kernel
 from brrt.worlds import World
 from tests.support import naive
@@ -33,19 +33,19 @@ def world_of(
 
 
 @kernel
-def first_to_second(obstacles: Obstacles, ends: Floats) -> bool:
+def first_to_second(obstacles: ObstacleGrid, ends: Floats) -> bool:
     """Whether the segment between two rows touches an obstacle."""
     return segment_hits(obstacles, ends, 0, ends, 1)
 
 
-def compiled_hits(obstacles: Obstacles, a: Floats, b: Floats) -> bool:
+def compiled_hits(obstacles: ObstacleGrid, a: Floats, b: Floats) -> bool:
     """Ask the kernel about one segment."""
     return bool(first_to_second(obstacles, np.array([a, b])))
 
 
 def check(world: World, segments: Iterator[Segment] | list[Segment]) -> None:
     """Hold the kernel to the exact test, for each segment both ways round."""
-    obstacles = build_obstacles(world)
+    obstacles = build_obstacle_grid(world)
     for a, b in segments:
         truth = naive.hits(world, a, b)
         for p, q in ((a, b), (b, a)):
@@ -57,7 +57,7 @@ def check(world: World, segments: Iterator[Segment] | list[Segment]) -> None:
 
 def check_exactly(world: World, segments: Iterator[Segment] | list[Segment]) -> None:
     """Hold the kernel to the exact test where nothing rounds enough to matter."""
-    obstacles = build_obstacles(world)
+    obstacles = build_obstacle_grid(world)
     for a, b in segments:
         said, truth = compiled_hits(obstacles, a, b), naive.hits(world, a, b)
         assert said == truth, f"from {a.tolist()} to {b.tolist()} in {world.to_json()}"
@@ -149,11 +149,11 @@ def test_corners_of_cells_far_from_the_origin(dim: int, offset: float) -> None:
     rng = np.random.default_rng(80 + dim)
     ulp = np.spacing(max(offset, 10.0))
     filler = world_of(dim, low=offset, high=offset + 10, boxes=[[offset] * 2 * dim] * 2000)
-    cells = build_obstacles(filler)
+    cells = build_obstacle_grid(filler)
     corners = offset + rng.integers(0, cells.shape, (2000, dim)) * cells.cell
     corners += rng.integers(-3, 4, corners.shape) * ulp
     world = world_of(dim, low=offset, high=offset + 10, boxes=np.hstack([corners, corners]))
-    obstacles = build_obstacles(world)
+    obstacles = build_obstacle_grid(world)
     for corner in corners[:1500]:
         along = np.round(rng.uniform(-1000, 1000, dim) * 10.0 ** rng.uniform(0, 3)) * ulp
         a, b = corner - along, corner + along
@@ -196,7 +196,7 @@ def test_long_or_flat_bounds(dim: int, flat: float) -> None:
 def test_tiny_and_huge_maps_get_a_grid(dim: int, size: float) -> None:
     """Nothing overflows or runs on for ever while the obstacles are entered."""
     boxes = [[0.2 * size] * dim + [0.4 * size] * dim] * 20
-    obstacles = build_obstacles(world_of(dim, high=size, boxes=boxes))
+    obstacles = build_obstacle_grid(world_of(dim, high=size, boxes=boxes))
     inside, far = np.full(dim, 0.3 * size), np.full(dim, 0.9 * size)
     assert compiled_hits(obstacles, inside, far)
     assert not compiled_hits(obstacles, 0.6 * far, far)
@@ -243,12 +243,12 @@ def test_every_segment_of_a_small_lattice(dim: int) -> None:
 
 @st.composite
 def border_cases(draw: st.DrawFn) -> tuple[World, list[Segment]]:
-    """Obstacles and segments whose coordinates lie on the borders of the grid's cells."""
+    """ObstacleGrid and segments whose coordinates lie on the borders of the grid's cells."""
     dim = draw(st.sampled_from([2, 3]))
     n = draw(st.integers(1, 6))
     size = draw(st.sampled_from([1.0, 0.3, 7.7, 100.0]))
     filler = world_of(dim, high=size, boxes=[[0.0] * 2 * dim] * n)
-    cells = build_obstacles(filler)
+    cells = build_obstacle_grid(filler)
     borders = [
         st.sampled_from([min(k * cell, size) for k in range(count + 1)])
         for cell, count in zip(cells.cell, cells.shape, strict=True)
@@ -381,7 +381,7 @@ def test_no_obstacles(dim: int) -> None:
 
 @DIMS
 def test_obstacles_beyond_the_bounds(dim: int) -> None:
-    """Obstacles outside do not matter; those that reach in do, however large they are."""
+    """ObstacleGrid outside do not matter; those that reach in do, however large they are."""
     rng = np.random.default_rng(dim)
     beyond = [[-9.0] * dim + [-1.0] * dim, [11.0] * dim + [1e9] * dim]
     reaching = [[9.0] * dim + [1e9] * dim, [-1e9] * dim + [0.5] * dim]
@@ -400,7 +400,7 @@ def test_an_obstacle_as_large_as_the_map(dim: int) -> None:
         world_of(dim, boxes=[[-1e12] * dim + [1e12] * dim]),
         world_of(dim, balls=[[5.0] * dim + [100.0]]),
     ):
-        obstacles = build_obstacles(world)
+        obstacles = build_obstacle_grid(world)
         assert all(compiled_hits(obstacles, a, b) for a, b in random_segments(rng, dim, 30))
 
 
@@ -438,7 +438,7 @@ def test_many_obstacles_share_cells(dim: int) -> None:
     rng = np.random.default_rng(70 + dim)
     low = rng.uniform(0, 9, (3000, dim))
     world = world_of(dim, boxes=np.hstack([low, low + rng.uniform(0.01, 4, (3000, dim))]))
-    obstacles = build_obstacles(world)
+    obstacles = build_obstacle_grid(world)
     assert len(obstacles.items) <= 64 * 3000 + 4096
     check(world, random_segments(rng, dim, 30))
 

@@ -22,7 +22,8 @@ from brrt.kernels.kdtree import (
     nearest,
     rooted_kdtree,
 )
-from brrt.robots.point import Point, PointSpace
+from brrt.kernels.spaces.point import PointSpace, point_space
+from brrt.robots import Point
 from brrt.worlds import World
 from tests.support import naive
 
@@ -33,7 +34,7 @@ DIMS = pytest.mark.parametrize("dim", [2, 3])
 
 def space_of(dim: int) -> PointSpace:
     """A point robot in an empty world; nearest neighbours do not mind the bounds."""
-    return Point().space(World("empty", np.zeros(dim), np.ones(dim)))
+    return point_space(Point(), World("empty", np.zeros(dim), np.ones(dim)))
 
 
 @kernel

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from brrt.kernels.jit import config, kernel
 from brrt.kernels.random import Random, borrow, give_back, uniform
-from brrt.kernels.spaces.space import distance, sample_informed, sample_uniform
-from brrt.robots.point import Point, PointSpace
+from brrt.kernels.space import distance, sample_informed, sample_uniform
+from brrt.kernels.spaces.point import PointSpace, point_space
+from brrt.robots import Point
 from brrt.worlds import World
 from tests.planners.test_rrt import FEW, bounds_of_binomial
 
@@ -134,7 +135,7 @@ ELLIPSES = [
 
 def unit_space(dim: int) -> PointSpace:
     """A point robot in an empty unit square or cube."""
-    return Point().space(World("empty", np.zeros(dim), np.ones(dim)))
+    return point_space(Point(), World("empty", np.zeros(dim), np.ones(dim)))
 
 
 def informed(ends: Floats, best: float, n: int, seed: int = 0) -> Floats:

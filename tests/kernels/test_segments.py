@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brrt.kernels.broad_phase import Obstacles, build_obstacles, segment_hits
+from brrt.kernels.broad_phase import ObstacleGrid, build_obstacle_grid, segment_hits
 from brrt.kernels.jit import config, kernel
 from brrt.worlds import Grid, World
 from tests.support import naive
@@ -37,7 +37,7 @@ NEAR = 1e-8
 
 
 @kernel
-def check_all(obstacles: Obstacles, A: Floats, B: Floats, hits: NDArray[np.bool_]) -> None:
+def check_all(obstacles: ObstacleGrid, A: Floats, B: Floats, hits: NDArray[np.bool_]) -> None:
     """Whether the segment from each row of A to the same row of B touches an obstacle."""
     for i in range(len(A)):
         hits[i] = segment_hits(obstacles, A, i, B, i)
@@ -47,7 +47,7 @@ def compiled_hits(world: World, A: Array, B: Array) -> NDArray[np.bool_]:
     """Ask the kernel about every segment."""
     a, b = (np.ascontiguousarray(P, np.float64) for P in (A, B))
     hits = np.zeros(len(A), np.bool_)
-    check_all(build_obstacles(world), a, b, hits)
+    check_all(build_obstacle_grid(world), a, b, hits)
     return hits
 
 

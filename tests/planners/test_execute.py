@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status
 from brrt.kernels.emit import EventLog
+from brrt.kernels.spaces import make_space
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing.execute import Execute
-from brrt.robots.point import Point
+from brrt.robots import Point
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 from brrt.worlds import World
@@ -32,7 +33,7 @@ def driven(
 ) -> Events:
     """The log of driving a path in an empty world of side 100."""
     dim = path.shape[1]
-    space = Point().space(World("empty", np.zeros(dim), np.full(dim, 100.0)))
+    space = make_space(Point(), World("empty", np.zeros(dim), np.full(dim, 100.0)))
     log = EventLog(dim, capacity, logical_clock=True)
     batches = Execute(max_move=max_move).drive(path, space, log, stop or Stop(), 7)
     return Events.concat(dim, batches)
@@ -119,7 +120,7 @@ def test_a_path_of_one_waypoint_needs_no_move() -> None:
 def test_an_interrupted_robot_stops(cut: int) -> None:
     """Interrupted after a batch, the moves made up to then stand, and the phase ends."""
     path = np.array([[0.0, 0.0], [90.0, 0.0]])
-    space = Point().space(World("empty", np.zeros(2), np.full(2, 100.0)))
+    space = make_space(Point(), World("empty", np.zeros(2), np.full(2, 100.0)))
     log, stop = EventLog(2, 10, logical_clock=True), Stop(interrupted=cut == 0)
     batches = []
     for number, batch in enumerate(Execute(max_move=1.0).drive(path, space, log, stop, 7), 1):

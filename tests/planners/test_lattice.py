@@ -21,7 +21,7 @@ from brrt.errors import BrrtError
 from brrt.events import FIELDS, Events, Kind, Reason, Stage, Status
 from brrt.kernels.emit import EventLog
 from brrt.kernels.jit import config, kernel
-from brrt.kernels.spaces.space import segment_free
+from brrt.kernels.space import segment_free
 from brrt.planners import AStar, LRTAStar, Planner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop

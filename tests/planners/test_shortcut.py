@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status
 from brrt.kernels.emit import EventLog
+from brrt.kernels.spaces import make_space
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing.shortcut import Shortcut
 from brrt.robots import Point
@@ -33,7 +34,7 @@ def smoothed(
     log = EventLog(world.dim, capacity, logical_clock=True)
     rng = np.random.Generator(np.random.PCG64(seed))
     batches = Shortcut(attempts=attempts).smooth(
-        path, Point().space(world), rng, log, stop or Stop(), 7
+        path, make_space(Point(), world), rng, log, stop or Stop(), 7
     )
     return Events.concat(world.dim, batches)
 

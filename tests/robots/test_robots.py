@@ -17,9 +17,10 @@ from numba.core import config as _config
 from numpy.typing import NDArray
 
 from brrt import BrrtError, Run, Scenario, World, make_world
+from brrt.kernels import space as kernels
 from brrt.kernels.jit import kernel
 from brrt.kernels.kdtree import insert, nearest, rooted_kdtree
-from brrt.kernels.spaces import space as kernels
+from brrt.kernels.spaces import make_space
 from brrt.robots import ROBOTS, Chain, Point, Polygon, Robot, make_robot, robot_from_json
 from brrt.robots.chain import Joint
 from tests.conftest import Result
@@ -73,7 +74,7 @@ def all_nearest(space: Any, tree: Any, points: Floats, Q: Floats, found: NDArray
 def free(robot: Robot, world: World, A: Floats, B: Floats) -> NDArray[np.bool_]:
     """Whether each motion is free, by the kernels."""
     found = np.zeros(len(A), np.bool_)
-    all_free(robot.space(world), A, B, found)
+    all_free(make_space(robot, world), A, B, found)
     return found
 
 
@@ -131,8 +132,7 @@ def random_edges(
     rng: np.random.Generator, robot: Robot, world: World, n: int
 ) -> tuple[Floats, Floats]:
     """Motions of any length from tiny to across the space, some along one coordinate."""
-    space = robot.space(world)
-    lower, upper = np.array(space.lower), np.array(space.upper)
+    lower, upper = robot.bounds(world)
     A = rng.uniform(lower, upper, (n, len(lower)))
     far = 10.0 ** rng.uniform(-3, 0, (n, 1)) * (rng.random(A.shape) < 0.8)
     B = A + far * (rng.uniform(lower, upper, A.shape) - A)
@@ -254,7 +254,7 @@ def test_metric_axioms(kind: str, seed: int) -> None:
     """Zero to itself, symmetric, the triangle inequality; the kernel's equals numpy's."""
     rng = np.random.default_rng(seed)
     world, robot = World("empty", np.zeros(2), np.full(2, 10.0)), MAKERS[kind](rng)
-    space = robot.space(world)
+    space = make_space(robot, world)
     a, b, c = rng.uniform(space.lower, space.upper, (3, 50, len(space.lower)))
     ab, ba, bc, ac = (robot.distance(*pair) for pair in ((a, b), (b, a), (b, c), (a, c)))
     assert (robot.distance(a, a) == 0).all()
@@ -287,7 +287,7 @@ def test_interpolation_is_linear_in_the_metric(kind: str, seed: int, part: float
     """The way so far and the way to go share the whole in proportion; angles stay in range."""
     rng = np.random.default_rng(seed)
     world, robot = World("empty", np.zeros(2), np.full(2, 10.0)), MAKERS[kind](rng)
-    space = robot.space(world)
+    space = make_space(robot, world)
     a, b = rng.uniform(space.lower, space.upper, (2, 50, len(space.lower)))
     middle, whole = np.empty_like(a), robot.distance(a, b)
     all_between(space, a, b, part, middle)
@@ -328,8 +328,8 @@ def test_box_measure_is_a_lower_bound(kind: str) -> None:
     rng = np.random.default_rng(3)
     for _ in range(3 if config.DISABLE_JIT else 50):
         world, robot = World("empty", np.zeros(2), np.full(2, 10.0)), MAKERS[kind](rng)
-        space = robot.space(world)
-        low, high = np.array(space.lower), np.array(space.upper)
+        space = make_space(robot, world)
+        low, high = robot.bounds(world)
         ends = np.sort(rng.uniform(low, high, (2, 200, len(low))), axis=0)
         inside = rng.uniform(ends[0], ends[1])
         inside = np.where(rng.random(inside.shape) < 0.3, ends[0], inside)
@@ -345,7 +345,7 @@ def test_nearest_neighbours_in_the_metric(kind: str, seed: int) -> None:
     """The k-d tree finds what brute force finds, across the seam of the angles too."""
     rng = np.random.default_rng(seed)
     world, robot = World("empty", np.zeros(2), np.full(2, 10.0)), MAKERS[kind](rng)
-    space = robot.space(world)
+    space = make_space(robot, world)
     points = rng.uniform(space.lower, space.upper, (200, len(space.lower)))
     Q = rng.uniform(space.lower, space.upper, (100, len(space.lower)))
     found = np.zeros(len(Q), np.int64)

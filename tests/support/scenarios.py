@@ -170,8 +170,7 @@ def _saved(folder: Path, what: str, text: str) -> str:
 
 def _free(rng: np.random.Generator, robot: Robot, world: World) -> Floats | None:
     """Draw a free configuration, now and then one at its limits."""
-    space = robot.space(world)
-    low, high = np.array(space.lower), np.array(space.upper)
+    low, high = robot.bounds(world)
     for _ in range(60):
         q = rng.uniform(low, high)
         if rng.random() < 0.2:

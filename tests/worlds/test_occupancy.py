@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brrt import Grid, Problem, World, make_robot
 from brrt.errors import BrrtError
-from brrt.kernels.broad_phase import Obstacles, build_obstacles, segment_hits
+from brrt.kernels.broad_phase import ObstacleGrid, build_obstacle_grid, segment_hits
 from brrt.kernels.jit import kernel
 from tests.conftest import Result
 from tests.support import naive
@@ -27,7 +27,7 @@ MANY = settings(max_examples=100, deadline=None)
 
 
 @kernel
-def _hits(obstacles: Obstacles, A: Floats, B: Floats, out: NDArray[np.bool_]) -> None:
+def _hits(obstacles: ObstacleGrid, A: Floats, B: Floats, out: NDArray[np.bool_]) -> None:
     """Whether each segment from A[i] to B[i] touches an obstacle."""
     for i in range(len(A)):
         out[i] = segment_hits(obstacles, A, i, B, i)
@@ -36,7 +36,7 @@ def _hits(obstacles: Obstacles, A: Floats, B: Floats, out: NDArray[np.bool_]) ->
 def hits(world: World, A: Floats, B: Floats) -> NDArray[np.bool_]:
     """Ask the kernel about segments, shape (n, 2) each."""
     out = np.zeros(len(A), bool)
-    _hits(build_obstacles(world), A, B, out)
+    _hits(build_obstacle_grid(world), A, B, out)
     return out
 
 

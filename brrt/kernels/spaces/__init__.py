@@ -1,1 +1,38 @@
-"""Configuration spaces of robots as kernels see them."""
+"""Configuration spaces of robots as kernels see them: one file and one line here for each robot."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from brrt.errors import BrrtError
+from brrt.kernels.spaces.chain import chain_space
+from brrt.kernels.spaces.point import point_space
+from brrt.kernels.spaces.polygon import polygon_space
+from brrt.robots import Chain, Point, Polygon, Robot
+from brrt.worlds.world import World
+
+SPACES: Mapping[type[Robot], Callable[[Any, World], Any]] = {
+    Point: point_space,
+    Polygon: polygon_space,
+    Chain: chain_space,
+}
+
+
+def make_space(robot: Robot, world: World) -> Any:
+    """Build the configuration space of a robot in a world: a NamedTuple, see `brrt.kernels.space`.
+
+    A space holds the work space of its motion check, so only one thread at a time may use it.
+
+    Args:
+        robot: The robot, resolved in the world.
+        world: Bounds and obstacles.
+
+    Raises:
+        BrrtError: No space is registered for the robot.
+    """
+    build = SPACES.get(type(robot))
+    if build is None:
+        raise BrrtError(
+            f"robot {robot.kind} has no configuration space for planning; add one to "
+            "brrt.kernels.spaces.SPACES"
+        )
+    return build(robot, world)

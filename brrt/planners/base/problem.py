@@ -1,12 +1,14 @@
 """What a planner is given: a robot in a world, and where it has to go."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.kernels.spaces import make_space
 from brrt.robots import Robot
 from brrt.worlds.world import World
 
@@ -16,7 +18,7 @@ _DRAWS = 10_000
 """Draws of a random configuration before the world is called too full for the robot."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """A query that is known to make sense.
 
@@ -25,7 +27,6 @@ class Problem:
         robot: What moves; settled in the world.
         start: First configuration, shape (dof,).
         goal: Last configuration, shape (dof,).
-        space: The robot's configuration space in this world, as kernels see it.
 
     Raises:
         BrrtError: The robot cannot be in this world, or start or goal has the wrong size, is not
@@ -36,12 +37,10 @@ class Problem:
     robot: Robot
     start: Floats
     goal: Floats
-    space: Any = field(init=False)
 
     def __post_init__(self) -> None:
         """Check start and goal."""
         object.__setattr__(self, "robot", self.robot.resolved(self.world))
-        object.__setattr__(self, "space", self.robot.space(self.world))
         for name in ("start", "goal"):
             q = np.array(getattr(self, name), dtype=np.float64).reshape(-1)
             text = ",".join(f"{x:g}" for x in q)
@@ -57,7 +56,7 @@ class Problem:
             why = self.robot.collision(self.world, q)
             if why is not None:
                 lower, upper = (
-                    ",".join(f"{x:g}" for x in b) for b in (self.space.lower, self.space.upper)
+                    ",".join(f"{x:g}" for x in b) for b in self.robot.bounds(self.world)
                 )
                 # What of a map is unknown, and how it counts, is why many a start is not free.
                 known = self.world.notes[:1] if self.world.grid is not None else ()
@@ -72,6 +71,11 @@ class Problem:
         """Numbers in a configuration."""
         return self.robot.dof(self.world)
 
+    @cached_property
+    def space(self) -> Any:
+        """The robot's configuration space in this world, as kernels see it."""
+        return make_space(self.robot, self.world)
+
 
 def random_configuration(name: str, robot: Robot, world: World, rng: np.random.Generator) -> Floats:
     """Draw a free configuration, evenly from all that are free, shape (dof,).
@@ -85,9 +89,9 @@ def random_configuration(name: str, robot: Robot, world: World, rng: np.random.G
     Raises:
         BrrtError: Nothing free was found.
     """
-    space = robot.space(world)
+    lower, upper = robot.bounds(world)
     for _ in range(_DRAWS):
-        q = robot.canonical(rng.uniform(space.lower, space.upper))
+        q = robot.canonical(rng.uniform(lower, upper))
         if robot.collision(world, q) is None:
             return q
     raise BrrtError(

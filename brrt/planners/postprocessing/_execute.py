@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from brrt.events import Kind
 from brrt.kernels.emit import Buffer, emit, room
 from brrt.kernels.jit import kernel
-from brrt.kernels.spaces.space import distance, interpolate
+from brrt.kernels.space import distance, interpolate
 
 Floats = NDArray[np.float64]
 

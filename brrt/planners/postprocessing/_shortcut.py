@@ -9,7 +9,7 @@ from brrt.events import Kind
 from brrt.kernels.emit import Buffer, emit, room
 from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.random import Random, uniform
-from brrt.kernels.spaces.space import distance, segment_free
+from brrt.kernels.space import distance, segment_free
 
 Floats = NDArray[np.float64]
 
