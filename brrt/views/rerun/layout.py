@@ -148,18 +148,21 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
     return f"### {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"
 
 
-def _results(figures: Mapping[str, Any] | None) -> dict[str, str]:
-    if figures is None:
+def _results(result: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return the rows of a run that ended; a result may lack keys that came later."""
+    if result is None:
         return {}
-    plural = "" if figures["iterations"] == 1 else "s"
-    rows = {"status": f"{figures['status']} after {figures['iterations']:,} iteration{plural}"}
-    what = "expanded" if figures["expanded"] else "nodes"
-    rows[what] = f"{figures['expanded'] or figures['nodes']:,}"
-    if figures["plan_time_s"] is not None:
-        rows["planning"] = f"{figures['plan_time_s'] * 1e3:.4g} ms"
+    iterations = result.get("iterations", 0)
+    rows = {
+        "status": f"{result.get('status')} after {iterations:,} iteration{'s' * (iterations != 1)}"
+    }
+    what = "expanded" if result.get("expanded") else "nodes"
+    rows[what] = f"{result.get(what, 0):,}"
+    if result.get("plan_time_s") is not None:
+        rows["planning"] = f"{result['plan_time_s'] * 1e3:.4g} ms"
     for name, key in (("path", "path_cost"), ("smoothed", "smoothed_cost")):
-        if figures[key] is not None:
-            rows[name] = f"{figures[key]:.6g}"
+        if result.get(key) is not None:
+            rows[name] = f"{result[key]:.6g}"
     return rows
 
 
