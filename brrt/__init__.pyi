@@ -1,7 +1,7 @@
-from brrt.comparison.comparison import Comparison as Comparison
-from brrt.comparison.events import Difference as Difference
+from brrt.comparison.comparison import compare as compare
+from brrt.comparison.difference import Difference as Difference
 from brrt.comparison.events import first_difference as first_difference
-from brrt.comparison.versus import compare as compare
+from brrt.comparison.report import Comparison as Comparison
 from brrt.errors import BrrtError as BrrtError
 from brrt.errors import RecordingError as RecordingError
 from brrt.events import Events as Events

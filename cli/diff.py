@@ -31,7 +31,7 @@ def diff(
 
     brrt diff run.mcap run.rrd --json
     """
-    from brrt.comparison.versus import compare  # noqa: PLC0415
+    from brrt.comparison.comparison import compare  # noqa: PLC0415
 
     runs = (_saved(opened(run, partial=partial), partial=partial) for run in (a, b))
     found = compare(*runs, names=(str(a), str(b)))

@@ -12,7 +12,7 @@ from .node import show_node, tree_number
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.comparison.events import Difference
+    from brrt.comparison.difference import Difference
     from brrt.events import Instant
     from brrt.recording import Recording
     from brrt.replay.tree_stats import TreeFigures
@@ -79,8 +79,8 @@ def replay(
 
     brrt replay run.mcap --node 80 --at-iteration 400
     """
-    from brrt.comparison.event_text import event_lines  # noqa: PLC0415
-    from brrt.comparison.events import Newest  # noqa: PLC0415
+    from brrt.comparison.difference import event_lines  # noqa: PLC0415
+    from brrt.comparison.events import RecentEvents  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
     from brrt.replay.snapshot import feed  # noqa: PLC0415
     from brrt.replay.transcript import Transcript  # noqa: PLC0415
@@ -102,9 +102,9 @@ def replay(
         return
     metrics = Metrics(recording.manifest)
     trees = TreeStats()
-    newest = [] if at_event is None else [Newest()]
+    recent = [] if at_event is None else [RecentEvents()]
     told = Transcript(recording.manifest, recording.robot()) if text else None
-    folds: list[Any] = [told] if told else [] if as_json else [trees, *newest]
+    folds: list[Any] = [told] if told else [] if as_json else [trees, *recent]
     end = feed(Saved(recording, partial=partial, verb=_VERB), [metrics, *folds], limits)
     if end is not None:
         _note_end(limits, *end)
@@ -120,7 +120,7 @@ def replay(
         grown = trees.figures()  # where they are no trees, nothing is told of the run
         print_summary(figures, recording.manifest.origins)
         _show_trees(grown)
-        for each in newest:
+        for each in recent:
             print_lines(event_lines(each.before(each.next)))
     else:
         print_lines(told.lines())
@@ -200,8 +200,6 @@ def _verdict(
     """Say whether a run is what another one was, and if not, where they part."""
     from dataclasses import replace  # noqa: PLC0415
 
-    from brrt.comparison.event_text import parting  # noqa: PLC0415
-
     a, b = (
         f"{name} (seed {each.manifest.scenario.seed})"
         for name, each in zip(names, recordings, strict=True)
@@ -212,9 +210,7 @@ def _verdict(
         return
     yield from (f"A  {a}", f"B  {b}")
     few = replace(first, before=first.before[-_FEW:])
-    yield from parting(
-        few, ("A", "B"), (recordings[0].result is None, recordings[1].result is None)
-    )
+    yield from few.lines(("A", "B"), (recordings[0].result is None, recordings[1].result is None))
 
 
 def _show_trees(trees: "list[TreeFigures]") -> None:

@@ -1,1 +1,1 @@
-"""Compare two runs: settings, figures, and the first event that differs."""
+"""Two recordings compared: settings, versions, metrics, and the first event that differs."""

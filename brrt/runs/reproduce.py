@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self, TypeGuard
 
-from brrt.comparison.event_text import parting, parting_as_dict
-from brrt.comparison.events import Deviation, Difference, first_difference
-from brrt.comparison.settings_diff import Row, rows_of
+from brrt.comparison.difference import Difference, Event
+from brrt.comparison.events import Deviation, first_difference
+from brrt.comparison.settings import Row, rows_of
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
 from brrt.planners import PLANNERS
@@ -57,7 +57,7 @@ class Again:
         if self.ended:
             yield f"{self.ended}; it was planned again as far as that"
         if self.first is not None:
-            yield from parting(self.first, ("recorded", "again"))
+            yield from self.first.lines(("recorded", "again"))
             return
         far = self.deviation
         how = "equal to the last bit"
@@ -78,7 +78,7 @@ class Again:
             "worst_field": far.name or None,
             "versions": [row._asdict() for row in self.versions],
             "ended": self.ended or None,
-            "first": first and parting_as_dict(first, ("recorded", "again")),
+            "first": first and first.as_dict(("recorded", "again")),
         }
 
 
@@ -239,5 +239,5 @@ def _ended_by_count(batch: Events) -> Events:
     return Events(batch.dof, {**batch.tables, Kind.PHASE: changed})
 
 
-def _begins_phase(event: dict[str, Any] | None) -> TypeGuard[dict[str, Any]]:
+def _begins_phase(event: Event | None) -> TypeGuard[Event]:
     return event is not None and event["kind"] == "phase" and event["status"] == "begin"

@@ -57,7 +57,9 @@ def test_a_seed_fixes_everything(brrt: Command) -> None:
     equal, parted = (brrt("replay", "a.mcap", "--check", f"{x}.mcap") for x in "bc")
     assert (equal.code, parted.code) == (0, 1)
     assert "a.mcap (seed 7) and b.mcap (seed 7) are equal" in equal.out
-    heading = "A  a.mcap (seed 7)\nB  c.mcap (seed 8)\nThey part at event 2; ahead of it:\n"
+    heading = (
+        "A  a.mcap (seed 7)\nB  c.mcap (seed 8)\nThe first difference is event 2; before it:\n"
+    )
     assert heading in parted.out
     assert all(len(line) <= 80 for line in parted.out.partition(heading)[2].splitlines())
     assert brrt("replay", "a.mcap", "--check", "c.mcap", "--json").json["check"]["equal"] is False

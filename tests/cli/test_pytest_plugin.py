@@ -93,7 +93,7 @@ def test_made_held_changed_and_renewed(pytester: pytest.Pytester, run: Pytest) -
     fresh = pytester.path / "failed" / "golden" / "forest.mcap"
     expected = brrt.compare(kept, fresh, names=("golden/forest.mcap", "failed/golden/forest.mcap"))
     assert "\n".join(expected.lines()) in text(changed)
-    assert "They part at event 2" in text(changed)
+    assert "The first difference is event 2" in text(changed)
     told = fresh.with_suffix(".txt").read_text()
     assert told.rstrip("\n") in text(changed)
     assert kept.read_bytes() == first
@@ -538,6 +538,6 @@ def test_the_recipe_for_ci(
     assert told == (failed / "report.md").read_text()
     headline = "another run from event 2 on"
     assert told.startswith(f"### golden/forest\n```\n{headline}\nA  golden/forest.mcap\n")
-    assert "They part at event 2" in told
+    assert "The first difference is event 2" in told
     assert brrt.read(failed / "golden" / "forest.rrd").manifest.scenario.seed == 8
     assert "failed/report.md" in steps["Comment"]["run"]

@@ -31,9 +31,9 @@ from brrt.explanation import Advice, Explanation, explain
 from brrt.explanation.clearance import Ways
 from brrt.explanation.gather import FAILED, Gather, Spans, Thinned
 from brrt.scenario.manifest import Manifest
-from tests.cli.test_replay import cut
 from tests.conftest import Result, recorded
 from tests.support import toys
+from tests.support.logs import split
 
 Command = Callable[..., Result]
 
@@ -50,7 +50,7 @@ GOLDEN = Path(__file__).parents[2] / "recordings"
 def explained(scenario: Scenario, size: int = 500, **at: int) -> Explanation:
     """Explain a scenario's run, read in batches of some size."""
     run, log = recorded(scenario)
-    parts = cut(log, size)
+    parts = split(log, size)
     return explain(snapshot(Recording(run.manifest, run.problem.world, lambda: iter(parts)), **at))
 
 

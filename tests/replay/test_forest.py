@@ -6,12 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from brrt import Events, Kind, RecordingError, forest
+from brrt import Events, Kind, RecordingError, Scenario, forest
 from brrt.events import table_dtype
 from brrt.robots import Point
+from tests.conftest import recorded
 
 Floats = NDArray[np.float64]
 DISTANCE = Point().distance
+SCENARIO = Scenario(world="circles2d:n=40,seed=3", seed=7, clock="logical")
 
 
 class Twin:
@@ -113,3 +115,54 @@ def test_impossible_rewires(rewire: tuple[int, int], message: str) -> None:
     """What cannot be done is an error that names the event."""
     with pytest.raises(RecordingError, match=message):
         forest(tree_of(rewire))
+
+
+def test_forest_is_the_planners_tree() -> None:
+    """Parents come before children, costs add up, and the path lies in the tree."""
+    _, log = recorded(SCENARIO)
+    tree = forest(log)[0]
+    assert len(tree) == len(log[Kind.EDGE])
+    rest = np.arange(1, len(tree))
+    assert tree.parent[0] == -1
+    assert (tree.parent[1:] < rest).all()
+    step = np.linalg.norm(tree.q[1:] - tree.q[tree.parent[1:]], axis=1)
+    assert np.allclose(tree.cost[1:], tree.cost[tree.parent[1:]] + step, rtol=1e-12)
+    raw = log[Kind.PATH][0]
+    assert np.array_equal(tree.path_to(len(tree) - 1), raw["waypoints"])
+    assert tree.cost[-1] == raw["cost"]
+
+
+def test_forest_depth_and_leaves() -> None:
+    """Depth and leaves, against walking every node up to the root."""
+    _, log = recorded(SCENARIO)
+    tree = forest(log)[0]
+    depths = [len(tree.path_to(node)) - 1 for node in range(len(tree))]
+    assert tree.depth == max(depths)
+    assert tree.leaves == sum(node not in tree.parent for node in range(len(tree)))
+
+
+def test_forest_at_any_instant_is_a_prefix() -> None:
+    """Cut at any event, the forest holds the nodes that were there by then."""
+    _, log = recorded(SCENARIO)
+    for seq in range(0, len(log), 17):
+        part = log.until(seq=seq)
+        assert len(part) == seq + 1
+        edges = part[Kind.EDGE]
+        assert sum(len(t) for t in forest(part).values()) == len(edges)
+        assert (edges["seq"] <= seq).all()
+
+
+def test_forest_refuses_gaps_and_circles() -> None:
+    """A node that is missing or its own ancestor is an error that names it."""
+    _, log = recorded(SCENARIO)
+    edges = log[Kind.EDGE].copy()
+    edges["node"][5] = 9
+    with pytest.raises(RecordingError, match="node 9 joins tree 0 as its node 5"):
+        forest(Events(2, {Kind.EDGE: edges}))
+    edges = log[Kind.EDGE].copy()
+    edges["parent"][3] = 3
+    tree = forest(Events(2, {Kind.EDGE: edges}))[0]
+    with pytest.raises(RecordingError, match="its own ancestor"):
+        tree.path_to(3)
+    with pytest.raises(RecordingError, match="its own ancestor"):
+        _ = tree.depth

@@ -16,8 +16,8 @@ from brrt import BrrtError, Events, Kind, Metrics, Recording, Scenario, forest, 
 from brrt.events import Reason
 from brrt.replay.cell_history import CellHistory
 from brrt.replay.history_records import NodeHistory
-from tests.cli.test_replay import cut
 from tests.conftest import Result, recorded
+from tests.support.logs import split
 
 Command = Callable[..., Result]
 
@@ -36,7 +36,7 @@ WALK = Scenario(
 def recording(scenario: Scenario, size: int = 100) -> Recording:
     """A recording of a scenario, in memory."""
     run, log = recorded(scenario)
-    parts = cut(log, size)
+    parts = split(log, size)
     return Recording(run.manifest, run.problem.world, lambda: iter(parts), None)
 
 
@@ -80,7 +80,7 @@ def test_a_moment_is_the_log_up_to_it(data: st.DataObject) -> None:
 def test_no_more_is_read_than_is_needed() -> None:
     """Nothing before something is asked for, and then no batch behind the one that ends it."""
     run, log = recorded(STAR)
-    parts, taken = cut(log, 50), []
+    parts, taken = split(log, 50), []
 
     def batches() -> Iterator[Events]:
         for i, part in enumerate(parts):
@@ -274,7 +274,7 @@ def test_the_event_of_an_instant_is_told(brrt: Command) -> None:
     told = " ".join(brrt("replay", "a.mcap", "--at-event", chosen[0]).out.split())
     assert all(repr(x) in told for x in q)
     late = brrt("replay", "a.mcap", "--at-event", len(log) + 5)
-    assert f"event {len(log) - 1:,}, and those" in late.out
+    assert f"event {len(log) - 1:,} and the events before it" in late.out
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from brrt import Events, Kind, RecordingError, Scenario, forest
 from brrt.replay.forest import depth_of
 from brrt.replay.tree_stats import TreeFigures, TreeStats
-from tests.cli.test_replay import cut
 from tests.conftest import recorded
+from tests.support.logs import split
 
 GROWS = Scenario(world="circles2d:n=40,seed=3", seed=7, planner="bi-rrt", clock="logical")
 REWIRES = replace(GROWS, planner="rrt-star", iterations=600)
@@ -33,7 +33,7 @@ def test_figures_are_the_forests(scenario: Scenario, data: st.DataObject) -> Non
     """At any instant, and whatever the batches, the figures are those of the trees."""
     _, log = recorded(scenario)
     part = log.until(seq=data.draw(st.integers(0, len(log) - 1)))
-    found = followed(cut(part, data.draw(st.integers(5, 900))))
+    found = followed(split(part, data.draw(st.integers(5, 900))))
     trees = forest(part)
     assert [figures.tree for figures in found] == list(trees)
     for figures in found:

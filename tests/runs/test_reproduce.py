@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from brrt import BrrtError, Events, Kind, McapSink, Run, Scenario, World, plan_again, read
 from brrt.events import Phase, Status
 from brrt.runs.reproduce import Again
-from tests.cli.test_replay import cut
 from tests.conftest import Result, recorded, result_of
+from tests.support.logs import split
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 PLAIN = Scenario(world="circles2d:n=30,seed=3", seed=7, execute=True, max_move=3.0)
@@ -69,7 +69,7 @@ def test_a_log_that_breaks_off(name: str) -> None:
     """Of a run that was killed, all that there is is compared."""
     run, log = recorded(PLANNERS[name])
     for seq in np.linspace(0, len(log) - 2, 12).astype(int):
-        found = again(run, cut(log.until(seq=int(seq)), 50))
+        found = again(run, split(log.until(seq=int(seq)), 50))
         assert found.equal
         assert found.events == seq + 1
 
@@ -198,7 +198,7 @@ def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: 
     sink.close(result_of(run.manifest, other))
     done = brrt("verify", "run.mcap", "--rerun")
     assert done.code == 1
-    assert "They part at event" in done.out
+    assert "The first difference is event" in done.out
 
 
 def test_a_stop_beyond_the_default() -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from brrt.comparison.events import Difference, first_difference
+from brrt.comparison.difference import Difference
+from brrt.comparison.events import first_difference
 from brrt.events import Events
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import Colour
