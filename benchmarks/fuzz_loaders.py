@@ -31,8 +31,8 @@ SEEN = (
     "json.decoder",
     "yaml",
     "PIL.Image",
-    "brrt.worlds.loaders.fields",
-    "brrt.worlds.loaders.pieces",
+    "brrt.worlds.loaders.yaml_fields",
+    "brrt.worlds.loaders.convex_decomposition",
 )
 """What is imported on demand otherwise."""
 

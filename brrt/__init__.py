@@ -28,6 +28,7 @@ _MODULES = {
     "GENERATORS": "worlds",
     "Grid": "worlds",
     "World": "worlds",
+    "load_world": "worlds",
     "make_world": "worlds",
     "Manifest": "scenario.manifest",
     "Scenario": "scenario.scenario",

@@ -46,4 +46,5 @@ from brrt.views.rerun.notebook import show as show
 from brrt.worlds import GENERATORS as GENERATORS
 from brrt.worlds import Grid as Grid
 from brrt.worlds import World as World
+from brrt.worlds import load_world as load_world
 from brrt.worlds import make_world as make_world

@@ -1,62 +1,79 @@
-"""Files: read whole or refused in one line, and what we write is never half there."""
+"""Safe file I/O: bounded reads, atomic replacement, and output files that survive a crash."""
 
+import errno
+import json
 import os
 import re
+import stat
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from brrt.errors import BrrtError
 
 LONGEST_LINE = 10_000
-"""Characters of a line of a text format, at most; real ones have a hundred."""
+"""Maximum characters of a line of a text format; real lines have about a hundred."""
 
 MOST_LINES = 4_000_000
-"""Of a text format; each takes a microsecond or two."""
+"""Maximum lines of a text format; each takes one or two microseconds to parse."""
+
+MOST_JSON_LISTS = 5_000_000
+"""Maximum lists and objects in JSON; each takes about a hundred bytes of memory once parsed."""
 
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n?|\n|\Z)")
 
+_SYNC_S = 1.0
+_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
+"""fsync fails with these on pipes and devices, which have no disk behind them."""
+
 
 def is_there(path: Path | str) -> bool:
-    """Whether there is something of that name; no if it cannot be told, where pathlib raises."""
+    """Whether a path exists; False where pathlib raises, as for a name that is too long."""
     return os.path.exists(path)  # noqa: PTH110
 
 
 def is_file(path: Path | str) -> bool:
-    """Whether there is a file of that name; no if it cannot be told, where pathlib raises."""
+    """Whether a path is a file; False where pathlib raises, as for a name that is too long."""
     return os.path.isfile(path)  # noqa: PTH113
 
 
 def read_bytes(path: Path, what: str, most_bytes: int, *, rest: bool = True) -> bytes:
-    """Read a file, of whatever kind, into bounded memory.
+    """Read a file, pipe or device into bounded memory.
 
     Args:
         path: The file.
-        what: What it is to hold, for messages ("a world").
-        most_bytes: A longer file is refused unread, an endless one once it is longer.
-        rest: Without it, the beginning of a longer file is returned.
+        what: What the file should contain, for messages ("a world").
+        most_bytes: Maximum size. A larger file is refused before it is read, an endless device
+            after that many bytes.
+        rest: If False, return the first `most_bytes` of a larger file instead of refusing it.
 
     Raises:
-        BrrtError: The file cannot be read, or is too long.
+        BrrtError: The file cannot be read or is too large.
     """
     try:
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size
             if size > most_bytes and rest:
-                raise BrrtError(f"{path}: {size:,} bytes are too many; {what} has {most_bytes:,}")
+                raise BrrtError(
+                    f"{path}: {size:,} bytes are too many; {what} has at most {most_bytes:,}"
+                )
             data = file.read(min(most_bytes, size or most_bytes) + rest)
     except (OSError, ValueError) as error:
         raise BrrtError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > most_bytes:
-        raise BrrtError(f"{path}: it does not end; {what} has at most {most_bytes:,} bytes")
+        raise BrrtError(
+            f"{path}: more than {most_bytes:,} bytes and no end; {what} has at most {most_bytes:,}"
+        )
     return data
 
 
 def read_text(path: Path, what: str, most_bytes: int) -> str:
-    """Read a text file, with or without a byte order mark, as `read_bytes` does.
+    """Read a UTF-8 text file, with or without byte order mark; see `read_bytes`.
 
     Raises:
-        BrrtError: The file cannot be read, is too long, or is no text.
+        BrrtError: The file cannot be read, is too large, or is not text.
     """
     try:
         text = read_bytes(path, what, most_bytes).decode("utf-8-sig")
@@ -67,15 +84,34 @@ def read_text(path: Path, what: str, most_bytes: int) -> str:
     return text
 
 
+def parse_json(text: str | bytes, what: str) -> Any:
+    """Parse JSON in bounded memory.
+
+    Args:
+        text: The JSON.
+        what: What it should contain, for messages ("a JSON world").
+
+    Raises:
+        BrrtError: The text is not JSON, or has more than `MOST_JSON_LISTS` lists and objects.
+    """
+    brackets: tuple[Any, ...] = ("[", "{") if isinstance(text, str) else (b"[", b"{")
+    if sum(map(text.count, brackets)) > MOST_JSON_LISTS:
+        raise BrrtError(f"not {what}: it has more than {MOST_JSON_LISTS:,} lists")
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BrrtError(f"not {what}: {str(error)[:120]}") from None
+
+
 def lines_of(name: str, text: str) -> Iterator[tuple[int, str]]:
-    """Yield number, from 1 on, and text of each line, one at a time: there may be millions.
+    r"""Yield the number, from 1, and the text of each line; ends may be \n, \r\n or \r.
 
     Args:
         name: Name of the file, for messages.
-        text: Its text; lines may end in any of the usual ways.
+        text: The text of the file.
 
     Raises:
-        BrrtError: A line is longer than any that means something, or there are too many.
+        BrrtError: A line is longer than `LONGEST_LINE`, or there are more than `MOST_LINES`.
     """
     for number, match in enumerate(_LINE.finditer(text), 1):
         start, end = match.span(1)
@@ -84,21 +120,21 @@ def lines_of(name: str, text: str) -> Iterator[tuple[int, str]]:
                 f"{name}:{number}: {end - start:,} characters; a line has at most {LONGEST_LINE:,}"
             )
         if number > MOST_LINES:
-            raise BrrtError(f"{name}: more than {MOST_LINES:,} lines; that is too much for a world")
+            raise BrrtError(f"{name}: more than {MOST_LINES:,} lines")
         yield number, match[1]
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Write a file elsewhere; it takes its name, and any older file's place, once it is whole.
+    """Write a file under a temporary name and rename it to `path` once it is complete.
 
     Yields:
-        The name to write to, in the same folder and with the same ending.
+        The temporary name, in the same folder and with the same suffix.
 
     Raises:
         BrrtError: The file cannot be written.
     """
-    unfinished = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+    unfinished = _temporary(path)
     try:
         yield unfinished
         unfinished.replace(path)
@@ -106,3 +142,131 @@ def replacing(path: Path) -> Iterator[Path]:
         raise BrrtError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def make_folder_of(path: Path) -> None:
+    """Make the folder of a file that is about to be written.
+
+    Raises:
+        BrrtError: The folder cannot be made.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BrrtError(f"cannot write {path}: {error.strerror or error}") from None
+
+
+class OutputFile:
+    """A file that is written over a long time and can be read while it grows.
+
+    It is written under a temporary name until `appear`, so that an older file of the same name is
+    replaced only once there is something to read in the new one. Data reaches the operating system
+    at once and survives a killed process; it is synced to the disk every second and at the end, and
+    survives a power cut up to there.
+
+    All methods raise OSError if the file cannot be written.
+
+    Args:
+        path: The file. Pipes and devices are written to directly.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._name = Path(os.path.realpath(path))
+        self._temporary: Path | None = None
+        if not _is_written_in_place(self._name):
+            self._temporary = _temporary(self._name)
+        self._file = (self._temporary or self._name).open("wb", buffering=0)
+        self._dirty, self._closing = False, threading.Event()
+        self._error: OSError | None = None
+        self._syncing: threading.Thread | None = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether the file is closed."""
+        return self._file.closed
+
+    def write(self, data: bytes | memoryview) -> None:
+        """Write all of `data`."""
+        if self._error is not None:
+            raise self._error
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+        self._dirty = True
+
+    def truncate(self, size: int) -> None:
+        """Remove what was written after the first `size` bytes, such as half a record."""
+        with suppress(OSError):
+            self._file.truncate(size)
+
+    def appear(self) -> None:
+        """Rename the file to its final name; later calls do nothing."""
+        if self._temporary is None or self.closed:
+            return
+        _sync(self._file.fileno())
+        temporary, self._temporary = self._temporary, None
+        temporary.replace(self._name)
+        self._syncing = threading.Thread(target=self._keep_synced, name="brrt sync", daemon=True)
+        self._syncing.start()
+
+    def close(self) -> None:
+        """Close the file; one that has not appeared is deleted."""
+        if self.closed:
+            return
+        self._closing.set()
+        if self._syncing is not None:
+            self._syncing.join()
+        try:
+            if self._error is not None:
+                raise self._error
+            if self._temporary is None:
+                _sync(self._file.fileno())
+        finally:
+            self._file.close()
+            if self._temporary is not None:
+                self._temporary.unlink(missing_ok=True)
+        if self._syncing is not None:
+            _sync_folder(self._name.parent)
+
+    def _keep_synced(self) -> None:
+        while not self._closing.wait(_SYNC_S):
+            if self._dirty:
+                self._dirty = False
+                try:
+                    _sync(self._file.fileno())
+                except OSError as error:
+                    self._error = error
+                    return
+
+
+def _temporary(path: Path) -> Path:
+    return path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+
+
+def _is_written_in_place(path: Path) -> bool:
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return False
+    if not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    # A folder that takes no new file leaves only writing into the existing one.
+    return not stat.S_ISREG(mode) or not os.access(path.parent, os.W_OK)
+
+
+def _sync(number: int) -> None:
+    try:
+        os.fsync(number)
+    except OSError as error:
+        if error.errno not in _CANNOT_SYNC:
+            raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """Sync the names in a folder to the disk, where folders can be opened for that."""
+    with suppress(OSError):
+        number = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.events import FIELDS, Events, Kind, Table
-from brrt.worlds.convex import GREATEST
+from brrt.worlds.arrays import GREATEST
 
 _LONGEST = 1 << 60
 """Nanoseconds of a run, 36 years, and iterations."""

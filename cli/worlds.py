@@ -108,7 +108,7 @@ def show(
 
     brrt worlds show map.txt --start 0,0,1 --goal 12,12,5 --out map.png
     """
-    from brrt.worlds.survey import connected, free_fraction  # noqa: PLC0415 - keep --help fast
+    from brrt.worlds.free_space import connected, free_fraction  # noqa: PLC0415 - keep --help fast
 
     from .outputs import check_display, check_output  # noqa: PLC0415
 
@@ -189,7 +189,7 @@ def _point(option: str, text: str | None) -> Any:
 
 
 def _sketch(world: "World") -> Any:
-    from .sketch import sketch  # noqa: PLC0415 - keep --help fast
+    from .draw_world import draw_world  # noqa: PLC0415 - keep --help fast
 
     try:
         "█░┌".encode(out.encoding)
@@ -198,7 +198,7 @@ def _sketch(world: "World") -> Any:
         blocks = False
     # Nobody scrolls a pipe or a file: there, the usual page will do.
     rows = max(out.size.height - 2, 20) if out.is_terminal else 42
-    return sketch(world, max(out.size.width, 24), rows, blocks=blocks)
+    return draw_world(world, max(out.size.width, 24), rows, blocks=blocks)
 
 
 def _write(world: "World", picture: Path | None, rrd: Path | None, *, view: bool) -> None:

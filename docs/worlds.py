@@ -17,6 +17,7 @@ import matplotlib.pyplot as plt
 from PIL import Image
 
 from brrt import GENERATORS, make_world
+from brrt.views.matplotlib.draw_world import plot_world
 
 COLUMNS, SIDE_IN = 8, 1.7
 
@@ -33,7 +34,7 @@ def main() -> None:
         world = make_world(f"{name}:{SHOWN.get(name, '')}")
         projection = "3d" if world.dim == 3 else None
         axes: Any = sheet.add_subplot(rows, COLUMNS, i + 1, projection=projection)
-        world.plot(axes)
+        plot_world(world, axes)
         axes.set_title(name, fontsize=8)
         if world.dim == 2:
             axes.set(xticks=[], yticks=[])

@@ -10,8 +10,8 @@ from brrt.explanation.gather import Gather
 from brrt.explanation.places import coarse
 from brrt.robots import Polygon, Robot
 from brrt.worlds.convex import inscribed
-from brrt.worlds.passage import Passage, narrowest, widest
-from brrt.worlds.survey import connected
+from brrt.worlds.free_space import connected
+from brrt.worlds.narrow_passage import Passage, narrowest, widest
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ _ALONG = 2000
 
 @dataclass(frozen=True, slots=True)
 class Narrow:
-    """The narrowest place on the widest way from start to goal; see `brrt.worlds.passage`.
+    """The narrowest place on the widest way from start to goal; see `brrt.worlds.narrow_passage`.
 
     Attributes:
         low: Least width of it.

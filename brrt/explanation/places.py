@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from brrt.explanation.gather import Gather
 from brrt.robots import Robot
 from brrt.verification.collision.motions import Obstacles, first_hits
-from brrt.worlds.raster import Lattice
-from brrt.worlds.survey import covered
+from brrt.worlds.free_space import occupied
+from brrt.worlds.rasterize import Raster
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Coverage:
 
     Attributes:
         cells: Cells with anything free in them.
-        share: Share of these with a node, or an expanded cell, in them.
+        share: Share of these with a node, or an expand_counts cell, in them.
         late: Share of the reached ones that were first reached in the run's last third.
         drought: Share of the run in the longest stretch in which none was reached first.
         single: Share of the reached ones with a single node in them. As long again, a run reaches
@@ -163,7 +163,7 @@ class Places:
         rng = np.random.default_rng(0)
         inside = index[:, None] + rng.random((n, _POINTS, index.shape[1]))
         points = (lattice.lower + inside * lattice.cell).reshape(-1, index.shape[1])
-        free = ~covered(self._world, points).reshape(n, _POINTS).all(axis=1) | reached
+        free = ~occupied(self._world, points).reshape(n, _POINTS).all(axis=1) | reached
         news = np.sort(first[reached])
         late = float((news > last * 2 / 3).mean())
         drought = float(np.diff(news, prepend=0, append=last).max() / max(last, 1))
@@ -190,9 +190,9 @@ class Places:
         return Gap(far, a.tolist(), b.tolist(), self.in_the_way(a, b))
 
 
-def coarse(world: World) -> Lattice:
+def coarse(world: World) -> Raster:
     """Return the coarse cells in which shares of the free space are counted."""
-    return Lattice.over(world.lower, world.upper, _CELLS[world.dim])
+    return Raster.over(world.lower, world.upper, _CELLS[world.dim])
 
 
 def _numbers(values: Floats) -> str:

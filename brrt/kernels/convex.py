@@ -151,7 +151,7 @@ def build_convex_obstacles(world: World, reach: float, joints: int = 1) -> Conve
         reach: Farthest distance of the body's points from its reference point.
         joints: Rotations between the reference point and the last part.
     """
-    world = world.solid()
+    world = world.without_grid()
     grid: ObstacleGrid = build_obstacle_grid(world)
     hulls, radii = [ball[None, :2] for ball in world.balls], world.balls[:, 2].tolist()
     for a, b, c, d in world.boxes:

@@ -38,7 +38,7 @@ def build_clearance_grid(world: World) -> ClearanceGrid:
     if grid is None:
         return ClearanceGrid(np.empty((0, 0), np.uint8), (0.0, 0.0, 1.0, 0.0, 1.0))
     taken, origin = grid.cells, grid.origin
-    if not grid.reaches_all_of(world.lower, world.upper):
+    if not grid.contains_box(world.lower, world.upper):
         taken, origin = (
             np.pad(taken, 1, constant_values=True),
             grid.to_world(np.full(2, -grid.resolution)),

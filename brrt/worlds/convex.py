@@ -1,34 +1,34 @@
-"""Convex shapes in the plane, as numpy sees them: reading them, and how far apart they are."""
+"""Convex polygons in the plane: reading them, and the distance between them."""
 
 import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.worlds.arrays import Floats, read_numbers
 
-Floats = NDArray[np.float64]
-
-GREATEST = 1e100
-"""Kernels square coordinates; beyond this they could not decide."""
-
-_SLIGHTLY_BENT = 1e-9
-"""A vertex may lie this part of its edges inside the hull: rounding does that to written files."""
+_ROUNDING = 1e-9
+"""A vertex of a convex polygon may be concave by this sine of its angle: files are rounded."""
 
 _MOST_EDGES = 24
-"""Edges of a polygon that a disc within is fitted to."""
+"""Number of a polygon's edges that `inscribed` takes into account."""
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> Floats:
+    """Return the corners of an axis-aligned rectangle, counter-clockwise, shape (4, 2)."""
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], np.float64)
 
 
 def convex_polygon(name: str, values: Any) -> Floats:
     """Read a convex polygon; two vertices make a line segment.
 
-    Vertices that repeat, or that lie on an edge, are left out.
+    Repeated vertices and vertices on an edge are dropped.
 
     Args:
         name: What it is called in messages.
-        values: Vertices in either sense of rotation, shape (k, 2).
+        values: Vertices in either direction, shape (k, 2).
 
     Returns:
         The vertices counter-clockwise, shape (k, 2).
@@ -36,15 +36,10 @@ def convex_polygon(name: str, values: Any) -> Floats:
     Raises:
         BrrtError: It is not a convex polygon in the plane.
     """
-    what = f"{name} must be 2 or more vertices, each a pair of numbers"
-    try:
-        vertices = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise BrrtError(what) from None
-    if vertices.ndim != 2 or vertices.shape[1] != 2 or len(vertices) < 2:
-        raise BrrtError(what)
-    if not (np.abs(vertices) <= GREATEST).all():
-        raise BrrtError(f"{name} must hold finite numbers up to {GREATEST:g} only")
+    what = "2 or more vertices, each a pair of numbers"
+    vertices = read_numbers(name, values, what, (None, 2))
+    if len(vertices) < 2:
+        raise BrrtError(f"{name} must be {what}")
     vertices = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
     if len(vertices) < 2:
         raise BrrtError(f"{name} must have 2 or more different vertices; these are all the same")
@@ -52,7 +47,7 @@ def convex_polygon(name: str, values: Any) -> Floats:
 
 
 def convex_polygons(name: str, values: Sequence[Any]) -> tuple[Floats, ...]:
-    """Read convex polygons, as `convex_polygon` reads one; most need no second look.
+    """Read convex polygons as `convex_polygon` does, many at a time.
 
     Args:
         name: What they are called in messages.
@@ -62,21 +57,19 @@ def convex_polygons(name: str, values: Sequence[Any]) -> tuple[Floats, ...]:
         BrrtError: One is not a convex polygon in the plane.
     """
     found: list[Floats | None] = [None] * len(values)
-    alike: dict[int, list[int]] = {}
+    by_length: dict[int, list[int]] = {}
     for i, value in enumerate(values):
         if isinstance(value, list | np.ndarray) and len(value) > 2:
-            alike.setdefault(len(value), []).append(i)
-    for which in alike.values():
+            by_length.setdefault(len(value), []).append(i)
+    for length, which in by_length.items():
         try:
-            several = np.array([values[i] for i in which], np.float64)
-        except (TypeError, ValueError, OverflowError):
-            continue
-        if several.ndim != 3 or several.shape[2] != 2 or not (np.abs(several) <= GREATEST).all():
+            several = read_numbers(name, [values[i] for i in which], "", (None, length, 2))
+        except BrrtError:
             continue
         cross, lengths, angles = _turns(several)
-        # Told from flat and from bent by more than rounding: nothing to leave out, and no doubt.
-        sure = (cross > _SLIGHTLY_BENT * lengths).all(axis=1) & (np.abs(angles - 2 * np.pi) < 1)
-        for i, polygon in zip(np.flatnonzero(sure).tolist(), several[sure], strict=True):
+        # Clearly convex and counter-clockwise: nothing to drop, reverse or refuse.
+        clear = (cross > _ROUNDING * lengths).all(axis=1) & (np.abs(angles - 2 * np.pi) < 1)
+        for i, polygon in zip(np.flatnonzero(clear).tolist(), several[clear], strict=True):
             found[which[i]] = polygon
     return tuple(
         convex_polygon(f"{name}[{i}]", values[i]) if polygon is None else polygon
@@ -89,8 +82,8 @@ def _hull_of_convex(name: str, vertices: Floats) -> Floats:
     if _cross(vertices - vertices[0], np.roll(vertices, -1, axis=0) - vertices[0]).sum() < 0:
         vertices = np.ascontiguousarray(vertices[::-1])
     turns, lengths, angle = _turns(vertices)
-    bent = turns < -_SLIGHTLY_BENT * lengths
-    if bent.any() or abs(angle - 2 * np.pi) > 1:
+    concave = turns < -_ROUNDING * lengths
+    if concave.any() or abs(angle - 2 * np.pi) > 1:
         at = vertices[int(turns.argmin())]
         raise BrrtError(
             f"{name} is not convex at ({at[0]:g}, {at[1]:g}); split it into convex polygons"
@@ -108,13 +101,14 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _turns(vertices: Floats) -> tuple[Floats, Floats, Floats]:
-    """At each vertex the cross and the lengths' product of its edges; the angle of all turns.
+    """Measure how polygons turn at each vertex.
 
     Args:
-        vertices: Of one polygon or of several with as many vertices each, shape (..., k, 2).
+        vertices: One polygon, or several with the same number of vertices, shape (..., k, 2).
 
     Returns:
-        Shapes (..., k), (..., k) and (...).
+        Cross product of the two edges at each vertex, shape (..., k), the product of their lengths,
+        shape (..., k), and the sum of all turning angles, shape (...).
     """
     after = np.roll(vertices, -1, axis=-2) - vertices
     before = np.roll(after, 1, axis=-2)
@@ -125,13 +119,13 @@ def _turns(vertices: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def axes_of(vertices: Floats) -> Floats:
-    """Directions that decide whether something is apart from shapes, of unit length.
+    """Return a shape's candidate separating axes, as unit vectors.
 
-    The outward normals of a polygon, counter-clockwise; a line segment's normals and directions,
-    as if it were a rectangle; none for a point.
+    These are the outward normals of a polygon that is counter-clockwise; the normals and the
+    directions of a line segment, as if it were a rectangle; none for a point.
 
     Args:
-        vertices: Of one shape or of several with as many vertices each, shape (..., k, 2).
+        vertices: One shape, or several with the same number of vertices, shape (..., k, 2).
 
     Returns:
         Directions, shape (..., m, 2).
@@ -140,7 +134,7 @@ def axes_of(vertices: Floats) -> Floats:
     if k < 2:
         return np.empty((*vertices.shape[:-2], 0, 2))
     along = np.roll(vertices, -1, axis=-2) - vertices
-    # Divided by the greatest component first: the squares of tiny ones would vanish.
+    # Divide by the largest component first: the squares of tiny ones would underflow.
     along /= np.abs(along).max(axis=-1, keepdims=True)
     along /= np.hypot(along[..., 0], along[..., 1])[..., None]
     normals = np.stack([along[..., 1], -along[..., 0]], axis=-1)
@@ -148,10 +142,10 @@ def axes_of(vertices: Floats) -> Floats:
 
 
 def gap(one: Floats, other: Floats) -> float:
-    """Lower bound of the distance between the hulls of two sets of vertices (separating axes).
+    """Return a lower bound of the distance between two convex shapes (separating axes).
 
-    Not above zero if they touch; exact, but for 2e-15 of the lengths at hand by which it errs on
-    the safe side, where a vertex faces an edge.
+    It is at most 0 if they touch. Where a vertex is closest to an edge it is exact but for 2e-15 of
+    the lengths involved, by which it is too small.
 
     Args:
         one: A point, a line segment or a convex polygon, counter-clockwise; shape (k, 2).
@@ -161,7 +155,7 @@ def gap(one: Floats, other: Floats) -> float:
     axes = np.concatenate([axes_of(one), -axes_of(other)])
     for point, shape in ((one, other), (other, one)):
         if len(point) == 1:
-            # The nearest point of a shape may be a vertex, and then no edge shows the distance.
+            # A vertex may be closest to the point; then no edge's normal shows the distance.
             between = shape - point
             nearest = between[np.hypot(*between.T).argmin()]
             size = np.hypot(*nearest)
@@ -173,20 +167,19 @@ def gap(one: Floats, other: Floats) -> float:
     return float(apart - 2e-15 * max(np.abs(one).max(), np.abs(other).max()))
 
 
-def touching_pair(parts: list[Floats], apart: int) -> tuple[int, int] | None:
-    """Return the first two shapes that touch and are at least `apart` in the list, or None."""
-    for (i, one), (j, other) in itertools.combinations(enumerate(parts), 2):
+def touching_pair(shapes: list[Floats], apart: int) -> tuple[int, int] | None:
+    """Return the first two shapes, at least `apart` places from each other, that touch, or None."""
+    for (i, one), (j, other) in itertools.combinations(enumerate(shapes), 2):
         if j - i >= apart and gap(one, other) <= 0:
             return i, j
     return None
 
 
 def inscribed(polygon: Floats) -> tuple[Floats, float]:
-    """Return the middle, shape (2,), and the radius of a largest disc within a convex polygon.
+    """Return centre, shape (2,), and radius of the largest disc within a convex polygon.
 
-    The middle is as far from three edges, or four that are parallel in pairs: all triples are
-    tried. Of polygons with many vertices only some edges are, so that the disc may be smaller than
-    the largest; it is within in any case.
+    The centre has the same distance from three edges, so all triples of edges are tried. For a
+    polygon of more than 24 edges only 24 are, and the disc may be smaller than the largest.
 
     Args:
         polygon: Vertices counter-clockwise, shape (k, 2); two make a line segment.
@@ -199,9 +192,9 @@ def inscribed(polygon: Floats) -> tuple[Floats, float]:
     some = np.linspace(0, len(polygon) - 1, min(len(polygon), _MOST_EDGES)).astype(np.int64)
     triples = np.array(list(itertools.combinations(some.tolist(), 3)))
     rows = np.concatenate([normals[triples], np.ones((*triples.shape, 1))], axis=2)
-    sound = np.abs(np.linalg.det(rows)) > _SLIGHTLY_BENT
-    found = np.linalg.solve(rows[sound], ends[triples[sound]][..., None])[:, :2, 0]
-    places = np.concatenate([middle[None], found])
-    radii = (ends - places @ normals.T).min(axis=1)
+    regular = np.abs(np.linalg.det(rows)) > _ROUNDING
+    found = np.linalg.solve(rows[regular], ends[triples[regular]][..., None])[:, :2, 0]
+    centres = np.concatenate([middle[None], found])
+    radii = (ends - centres @ normals.T).min(axis=1)
     best = int(radii.argmax())
-    return places[best], float(radii[best])
+    return centres[best], float(radii[best])

@@ -34,7 +34,7 @@ def test_wall_clock_that_jumps(name: str, tmp_path: Path, monkeypatch: pytest.Mo
     ticks = map(CLOCKS[name], chain(range(1, 1000), repeat(7)))
     monkeypatch.setattr(time, "time_ns", lambda: next(ticks))
     monkeypatch.setattr(time, "time", lambda: next(ticks) / 1e9)
-    monkeypatch.setattr("brrt.formats.output._SYNC_S", 0.001)
+    monkeypatch.setattr("brrt.files._SYNC_S", 0.001)
     run = Run(Scenario(world="circles2d:n=40", seed=7), batch=50)
     paths, world, memory = [tmp_path / "x.mcap", tmp_path / "x.rrd"], run.problem.world, Memory()
     run.execute([

@@ -17,7 +17,8 @@ from rerun.chunk import RrdReader
 
 from brrt import GENERATORS, BrrtError, McapSink, Memory, Run, Scenario, World, check, read
 from brrt.views.colours import GOAL, START, Colour
-from brrt.worlds import LOADERS, Grid, make_world
+from brrt.views.matplotlib.draw_world import plot_world
+from brrt.worlds import LOADERS, Grid, load_world, make_world
 from tests.conftest import Result
 
 Command = Callable[..., Result]
@@ -318,7 +319,7 @@ def test_a_world_that_was_made_is_the_same_world(spec: str, brrt: Command) -> No
     done = brrt("worlds", "make", spec, "--out", "w.json")
     assert done.code == 0
     assert "--world w.json" in done.out
-    one, other = make_world(spec), World.load("w.json")
+    one, other = make_world(spec), load_world("w.json")
     for name in ("lower", "upper", "start", "goal", "balls", "boxes"):
         assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
     assert all((a == b).all() for a, b in zip(one.polygons, other.polygons, strict=True))
@@ -333,7 +334,7 @@ def test_ends_that_are_given_are_saved(brrt: Command) -> None:
     brrt(
         "worlds", "make", "circles2d:n=90", "--start", "50,50", "--goal", "10,90", "--out", "w.json"
     )
-    world = World.load("w.json")
+    world = load_world("w.json")
     assert world.start is not None
     assert world.start.tolist() == [50, 50]
     assert world.obstacle_at([50, 50]) is None
@@ -435,20 +436,6 @@ def test_a_world_made_by_hand_is_planned_in(tmp_path: Path) -> None:
     assert check(saved.manifest, saved.world, memory.events()) == []
 
 
-def test_worlds_are_generated_by_name() -> None:
-    """The short names are generators; the name is what the command line takes."""
-    world = World.circles(n=20, seed=3, max_radius=2.5)
-    assert world.name == "circles2d:n=20,seed=3,max_radius=2.5"
-    assert (world.balls == make_world(world.name).balls).all()
-    assert World.squares(n=3).name == "squares2d:n=3"
-    assert len(World.spheres(n=7).balls) == 7
-    assert World.generate("boxes3d").name == "boxes3d"
-    with pytest.raises(BrrtError, match="unknown parameter of world circles2d 'radius'"):
-        World.circles(radius=2)
-    with pytest.raises(BrrtError, match=r"unknown world 'w\.json'"):
-        World.generate("w.json")
-
-
 def test_a_world_is_described_in_a_line() -> None:
     """However much is in it."""
     text = repr(make_world("boxes3d:n=10000,max_side=3"))
@@ -467,12 +454,13 @@ def test_a_plot_is_put_where_it_is_asked_for() -> None:
     import matplotlib.pyplot as plt
 
     _, axes = plt.subplots(1, 2)
-    assert World.circles().plot(axes[1]) is axes[1]
+    assert plot_world(make_world("circles2d"), axes[1]) is axes[1]
     assert axes[1].get_xlim() == (0, 100)
     assert not axes[0].collections
-    assert World.spheres(n=3).plot().name == "3d"
+    spheres = make_world("spheres3d:n=3")
+    assert plot_world(spheres).name == "3d"
     with pytest.raises(BrrtError, match="projection"):
-        World.spheres(n=3).plot(axes[0])
+        plot_world(spheres, axes[0])
     plt.close("all")
 
 
@@ -482,7 +470,7 @@ def test_notes_are_said_and_not_saved(
     """On stderr by each command that makes the world; --json has them too."""
     lines = ["boundary 0 0 0 10 10 10", "block 1 1 1 2 2 12"]
     (tmp_path / "map.txt").write_text("\n".join(lines))
-    noted = World.load("map.txt").notes
+    noted = load_world("map.txt").notes
     if not noted:
         pytest.skip("no loader notes this yet")
     ends = ("--start", "5,5,5", "--goal", "9,9,9")

@@ -20,11 +20,11 @@ from mcap.reader import make_reader
 
 from brrt import Events, Kind, McapSink, RecordingError, Run, Scenario, first_difference, read
 from brrt.events import table_dtype
+from brrt.files import OutputFile
 from brrt.formats import CutError, DamagedError
 from brrt.formats.background import Background
 from brrt.formats.integrity import Numbering
 from brrt.formats.mcap import writer
-from brrt.formats.output import Output
 from brrt.formats.recover import NOTE, recover
 from brrt.formats.rrd.checksum import BLANK, WRITTEN
 from brrt.formats.rrd.frames import BATCH, FRAME, HEAD, unpacked
@@ -180,10 +180,10 @@ def test_whatever_happens_to_a_drain_is_told(
 ) -> None:
     """An error of any kind on its thread ends in one line; its pipe is emptied all the same."""
 
-    def fail(self: Output, data: bytes) -> None:
+    def fail(self: OutputFile, data: bytes) -> None:
         raise MemoryError("too much")
 
-    monkeypatch.setattr(Output, "write", fail)
+    monkeypatch.setattr(OutputFile, "write", fail)
     drain = Drain(tmp_path / "x.rrd")
     with open(drain.inlet, "wb") as inlet:  # noqa: PTH123 - no path
         inlet.write(bytes(3_000_000))
@@ -203,7 +203,7 @@ def test_disk_that_fails_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     path = tmp_path / "run.mcap"
     run, log = recorded(SCENARIO, batch=100)
     sink = new_sink(path, run)
-    monkeypatch.setattr("brrt.formats.output.os.fsync", fail)
+    monkeypatch.setattr("brrt.files.os.fsync", fail)
     with pytest.raises(RecordingError, match="Input/output error"):
         run_all(sink, log)
 

@@ -310,6 +310,6 @@ def test_twins_against_fractions(draw: Draw, dim: int, built: Built) -> None:
         for _ in range(4):
             world = draw(rng, dim, side)
             a, b = segments(rng, world, 60)
-            solid = built(world, 1.0).solid()
+            solid = built(world, 1.0).without_grid()
             touches = [naive.hits(solid, p, q) for p, q in zip(a, b, strict=True)]
             assert ((world_gap(world, a, b) <= 0) == touches).all()

@@ -30,7 +30,7 @@ from brrt.events import Stage
 from brrt.views import foxglove
 from brrt.views.foxglove import interval_topics
 from brrt.views.rerun import layout
-from brrt.worlds.survey import covered
+from brrt.worlds.free_space import occupied
 from tests.conftest import Result, recorded
 
 GOLDENS = Path(__file__).parents[2] / "recordings"
@@ -345,7 +345,7 @@ def test_flat_worlds_are_filled(spec: str, tmp_path: Path) -> None:
                 hit |= (edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0] >= 0).all(axis=1)
     for grid in maps:
         hit |= blocked(grid, tries)
-    assert (hit == covered(world, tries)).all()
+    assert (hit == occupied(world, tries)).all()
 
 
 def blocked(message: Any, tries: Any) -> Any:

@@ -25,7 +25,7 @@ from brrt.views.matplotlib import curves, style
 from brrt.views.matplotlib.animation import Pace, instants, save_animation
 from brrt.views.matplotlib.figure import Look, save_plot
 from brrt.views.matplotlib.history import History, Record
-from brrt.worlds.survey import covered
+from brrt.worlds.free_space import occupied
 from tests.conftest import Result
 
 Command = Callable[..., Result]
@@ -218,7 +218,7 @@ def test_dark_is_what_is_covered(name: str, brrt: Command) -> None:
     left, right, top, bottom = picture.frame
     part = np.stack([(columns - left) / (right - left), (bottom - rows) / (bottom - top)], axis=1)
     world = golden(name).world
-    hit = covered(world, world.lower + part * (world.upper - world.lower))
+    hit = occupied(world, world.lower + part * (world.upper - world.lower))
     dark = (picture.colours[rows, columns] < 100).all(axis=1)
     assert abs(dark.mean() - hit.mean()) < 0.01
     assert (dark == hit).mean() > 0.98

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.worlds import GENERATORS, World, make_world
-from brrt.worlds.generators.carving import merged, without
+from brrt.worlds.generators.box_subtraction import merge_cells, subtract_box
 from brrt.worlds.generators.generator import Seeded
 from brrt.worlds.generators.scattered import Scattered
 from tests.worlds.test_worlds import assert_same, refused
@@ -49,7 +49,7 @@ def corners(world: World) -> tuple[Floats, Floats]:
 # What holds for every world
 
 
-def covered(world: World, points: Floats) -> NDArray[np.bool_]:
+def occupied(world: World, points: Floats) -> NDArray[np.bool_]:
     """Whether an obstacle touches each point, shape (n, d): obstacle by obstacle."""
     d, found = world.dim, np.zeros(len(points), np.bool_)
     for ball in world.balls:
@@ -185,7 +185,7 @@ def test_any_parameters_make_a_world_or_one_line(
     for end in (world.start, world.goal):
         assert end is not None
         assert world.inside(end)
-        assert not covered(world, end[None]).any()
+        assert not occupied(world, end[None]).any()
         if name in (*BALLS, *BOXES, "forest2d", "forest3d"):
             distances = [apart(world, number, end) for number in range(len(least))]
             assert min(distances, default=np.inf) >= room * generator.size
@@ -429,12 +429,12 @@ def test_density(name: str, density: float) -> None:
     ).groups()  # type: ignore[union-attr]
     assert int(count) == len(world.balls) + len(world.boxes) + len(world.polygons)
     error = 4 * np.sqrt(density / len(points)) + 0.003
-    assert abs(covered(world, points).mean() - float(share)) < error
+    assert abs(occupied(world, points).mean() - float(share)) < error
     assert float(share) >= density
     less = replace(
         world, balls=world.balls[:-1], boxes=world.boxes[:-1], polygons=world.polygons[:-1]
     )
-    assert covered(less, points).mean() < density + error
+    assert occupied(less, points).mean() < density + error
 
 
 @SCATTERED
@@ -566,7 +566,7 @@ def test_a_box_without_a_hole(data: st.DataObject, dim: int) -> None:
     """Every unit cell of the box is in one of the boxes, but for those of the hole."""
     cells = np.zeros((5,) * dim, np.int64)
     low, high = np.sort(data.draw(arrays(int, (2, dim), elements=st.integers(-3, 8))), axis=0)
-    for box in without(np.zeros(dim), np.full(dim, 5), [low, high]).astype(int):
+    for box in subtract_box(np.zeros(dim), np.full(dim, 5), [low, high]).astype(int):
         assert (box[:dim] < box[dim:]).all()
         cells[tuple(slice(i, j) for i, j in zip(box[:dim], box[dim:], strict=True))] += 1
     inside = np.argwhere(np.ones_like(cells))
@@ -580,7 +580,7 @@ def test_merged_boxes_are_the_blocked_cells(dim: int, n: int, seed: int, part: f
     rng = np.random.default_rng(seed)
     blocked = rng.random((n,) * dim) < part
     edges = np.cumsum(rng.random(n + 1))
-    boxes = np.searchsorted(edges, merged(blocked, edges))
+    boxes = np.searchsorted(edges, merge_cells(blocked, edges))
     painted = np.zeros(blocked.shape, np.int64)
     for box in boxes:
         painted[tuple(slice(i, j) for i, j in zip(box[:dim], box[dim:], strict=True))] += 1
@@ -622,13 +622,13 @@ def cell_graph(world: World, cells: int, side: float, wall: float) -> Pairs:
     """Neighbours with a way between them, as flat indices, shape (n, 2)."""
     places = np.argwhere(np.ones((cells,) * world.dim))
     middles = np.asarray(side / 2 + places * (side + wall), np.float64)
-    assert not covered(world, middles).any()
+    assert not occupied(world, middles).any()
     pairs = []
     for axis in range(world.dim):
         inner = np.flatnonzero(places[:, axis] < cells - 1)
         between = middles[inner] + np.eye(world.dim)[axis] * ((side + wall) / 2)
         others = inner + cells ** (world.dim - 1 - axis)
-        pairs.append(np.stack([inner, others], axis=1)[~covered(world, between)])
+        pairs.append(np.stack([inner, others], axis=1)[~occupied(world, between)])
     return np.concatenate(pairs)
 
 

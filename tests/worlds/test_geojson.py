@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 
 from brrt.worlds import World, load_world, make_world
 from brrt.worlds.convex import convex_polygon
-from brrt.worlds.loaders.pieces import convex_pieces
+from brrt.worlds.loaders.convex_decomposition import convex_pieces
 from tests.support.world_files import SQUARE, refused
 
 L = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4], [0, 0]]
@@ -155,8 +155,8 @@ BOW = [[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]
         (of("Polygon", [SQUARE[:-1]]), ": ring 0 must have 4 or more positions and end where it"),
         (of("Polygon", [SQUARE[:2] + SQUARE[:1]]), ": ring 0 must have 4 or more"),
         (of("Polygon", [SQUARE, SQUARE[:-1]]), ": ring 1 must have 4 or more"),
-        (of("Polygon", [[[x, y + 1e200] for x, y in SQUARE]]), ": ring 0 must hold finite numbers"),
-        (json.dumps(of("Polygon", [SQUARE])).replace("4", "NaN"), ": ring 0 must hold finite"),
+        (of("Polygon", [[[x, y + 1e200] for x, y in SQUARE]]), ": ring 0 must be finite numbers"),
+        (json.dumps(of("Polygon", [SQUARE])).replace("4", "NaN"), ": ring 0 must be finite"),
         (of("Polygon", [BOW]), ": not a polygon that encloses an area: Self-intersection at 2 2"),
         (of("Polygon", [[[0, 0]] * 4]), ": not a polygon that encloses an area: Too few points"),
         (of("Polygon", [HOLE, SQUARE]), ": not a polygon that encloses an area: Hole lies outside"),
@@ -187,7 +187,7 @@ def test_bad_geojson(data: Any, message: str, tmp_path: Path) -> None:
 def test_without_shapely(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is an extra, and its absence is one line."""
     monkeypatch.setitem(sys.modules, "shapely", None)
-    monkeypatch.delitem(sys.modules, "brrt.worlds.loaders.pieces", raising=False)
+    monkeypatch.delitem(sys.modules, "brrt.worlds.loaders.convex_decomposition", raising=False)
     path = tmp_path / "w.geojson"
     path.write_text(json.dumps(of("Polygon", [SQUARE])))
     assert refused(lambda: load_world(path)) == (

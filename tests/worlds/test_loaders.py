@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from brrt import Scenario
-from brrt.worlds import LOADERS, load_world, make_world
-from brrt.worlds.loaders.loader import FileSpec
+from brrt.worlds import LOADERS, FileSpec, load_world, make_world
 from tests.support.world_files import (
     BLOCKS,
     CIRCLES,

@@ -18,6 +18,7 @@ from brrt import Grid, Problem, World, make_robot
 from brrt.errors import BrrtError
 from brrt.kernels.broad_phase import ObstacleGrid, build_obstacle_grid, segment_hits
 from brrt.kernels.jit import kernel
+from brrt.worlds import load_world
 from tests.conftest import Result
 from tests.support import naive
 
@@ -75,7 +76,7 @@ def test_lattice_segments_agree_exactly(cells: NDArray[np.bool_], seed: int) -> 
     world = World.of_grid("cells", Grid(cells, np.array([3.0, -2.0]), 0.5))
     sides = 2 * np.array(cells.shape[::-1])
     A, B = (world.lower + rng.integers(0, sides + 1, (60, 2)) / 4 for _ in range(2))
-    solid = world.solid()
+    solid = world.without_grid()
     truth = [naive.hits(solid, a, b) for a, b in zip(A, B, strict=True)]
     assert hits(world, A, B).tolist() == truth
     assert hits(world, B, A).tolist() == truth
@@ -94,7 +95,7 @@ def test_any_segments(cells: NDArray[np.bool_], seed: int, unit: float, offset: 
     world = World.of_grid("cells", Grid(cells, np.array([offset, -offset]) * unit, unit))
     A = rng.uniform(world.lower, world.upper, (40, 2))
     B = np.clip(A + rng.normal(size=(40, 2)) * world.extent * 0.3, world.lower, world.upper)
-    solid = world.solid()
+    solid = world.without_grid()
     for a, b, said in zip(A, B, hits(world, A, B), strict=True):
         truth = naive.hits(solid, a, b)
         assert said or not truth, (a.tolist(), b.tolist())
@@ -127,7 +128,7 @@ def test_turned_grids(cells: NDArray[np.bool_], seed: int, yaw: float, offset: f
     rng = np.random.default_rng(seed)
     grid = Grid(cells, np.array([offset, -offset]), 0.05, yaw)
     world = World.of_grid("turned", grid)
-    solid = world.solid()
+    solid = world.without_grid()
     assert solid.grid is None
     A, B = (rng.uniform(world.lower, world.upper, (100, 2)) for _ in range(2))
     assert (hits(world, A, B) == hits(solid, A, B)).mean() > 0.98
@@ -146,7 +147,7 @@ def test_bounds_beyond_the_grid_are_blocked() -> None:
     A = np.array([[2.0, 2.0], [0.5, 3.0], [2.0, 2.0], [3.0, 5.5]])
     B = np.array([[4.0, 4.0], [3.0, 3.0], [5.5, 4.0], [3.0, 5.5]])
     assert hits(world, A, B).tolist() == [False, True, True, True]
-    assert hits(world.solid(), A, B).tolist() == [False, True, True, True]
+    assert hits(world.without_grid(), A, B).tolist() == [False, True, True, True]
     assert "blocked cells" in str(world.obstacle_at([0.5, 3.0]))
     body = make_robot("polygon:length=1,width=1")
     assert body.collision(world, np.array([3.0, 3.0, 0.0])) is None
@@ -159,7 +160,7 @@ def test_bodies_among_cells() -> None:
     cells = rng.random((30, 30)) < 0.05
     for yaw in (0.0, 0.3):
         world = World.of_grid("cells", Grid(cells, np.zeros(2), 1.0, yaw))
-        body, solid = make_robot("polygon:length=2,width=0.5"), world.solid()
+        body, solid = make_robot("polygon:length=2,width=0.5"), world.without_grid()
         free = []
         for _ in range(300):
             q = rng.uniform([*world.lower, -3], [*world.upper, 3])
@@ -203,19 +204,19 @@ GOOD = {
         ({"rows": 2.5}, "rows must be a whole number above 0"),
         ({"rows": True}, "rows must be a whole number above 0"),
         ({"rows": 10**6, "columns": 10**6}, "are more than"),
-        ({"rows": 5}, "do not fill rows x columns"),
-        ({"cells": bits(3)}, "do not fill rows x columns"),
-        ({"cells": bits(10**8)}, "do not fill rows x columns"),
+        ({"rows": 5}, "a bit for each of rows x columns"),
+        ({"cells": bits(3)}, "a bit for each of rows x columns"),
+        ({"cells": bits(10**8)}, "a bit for each of rows x columns"),
         ({"cells": "%"}, "deflated bits"),
         ({"cells": "AAAA"}, "deflated bits"),
         ({"cells": 7}, "deflated bits"),
         ({"origin": [0]}, "origin must be 2 finite numbers"),
         ({"origin": "here"}, "origin must be 2 finite numbers"),
-        ({"origin": [0, float("nan")]}, "origin must be 2 finite numbers"),
+        ({"origin": [0, float("nan")]}, "origin must be finite numbers"),
         ({"resolution": 0}, "resolution must be above 0, not 0"),
         ({"resolution": -1}, "resolution must be above 0, not -1"),
         ({"resolution": [1]}, "resolution must be a finite number"),
-        ({"resolution": 1e100}, "size must be"),
+        ({"resolution": 1e100}, "corners must be"),
         ({"yaw": None}, "yaw must be a finite number"),
         ({"yaw": float("inf")}, "yaw must be a finite number"),
         ({"extra": 1}, "with the fields rows, columns"),
@@ -235,7 +236,7 @@ def test_wrong_cells() -> None:
     for cells in tables:
         with pytest.raises(BrrtError, match="cell"):
             Grid(cells, np.zeros(2), 1.0)
-    with pytest.raises(BrrtError, match="a grid lies in the plane"):
+    with pytest.raises(BrrtError, match="grids are for 2D worlds"):
         World("w", np.zeros(3), np.ones(3), grid=Grid(np.zeros((2, 2), bool), np.zeros(2), 1.0))
 
 
@@ -254,10 +255,10 @@ def test_pictures_stand_as_the_file_does(tmp_path: Path, brrt: Callable[..., Res
     (tmp_path / "m.map").write_text("type octile\nheight 2\nwidth 4\nmap\n@@@@\n....\n")
     brrt("worlds", "make", "m.map", "--out", "m.json")
     for name in ("m.map", "m.json"):
-        assert World.load(name).y_down
+        assert load_world(name).y_down
         lines = brrt("worlds", "show", name).out.splitlines()
         assert "█" in lines[1] or "#" in lines[1]
         frame = next(i for i, line in enumerate(lines[1:], 1) if line[0] in "└+")
         assert not lines[frame - 1].strip("│| ")
     with pytest.raises(BrrtError, match="y_down must be true or false"):
-        World.from_json(World.load("m.json").to_json().replace('"y_down": true', '"y_down": 1'))
+        World.from_json(load_world("m.json").to_json().replace('"y_down": true', '"y_down": 1'))

@@ -121,27 +121,27 @@ def test_good_json() -> None:
         ({"lower": {"x": 1}}, "world: "),
         ({"upper": [1e200, 1]}, "upper"),
         ({"balls": [[0, 0, 1e200]]}, "balls"),
-        ({"upper": [1e999, 1]}, "upper must hold finite numbers only"),
-        ({"upper": [float("nan"), 1]}, "upper must hold finite numbers only"),
+        ({"upper": [1e999, 1]}, "upper must be finite numbers up to 1e+100"),
+        ({"upper": [float("nan"), 1]}, "upper must be finite numbers up to 1e+100"),
         ({"upper": [10**400, 1]}, "upper"),
         ({"balls": [[1, 1]]}, "balls must be rows of 3 numbers"),
         ({"balls": [[1, 2], [3, 4], [5, 6]]}, "balls must be rows of 3 numbers"),
-        ({"balls": [[1, 1, 1], [1, 1]]}, "balls[1] and all others must be rows of 3 numbers"),
-        ({"balls": [[1, 1, -0.5]]}, "balls[0]: the radius must not be below zero: -0.5"),
-        ({"balls": [[1, 1, float("inf")]]}, "balls must hold finite numbers only"),
+        ({"balls": [[1, 1, 1], [1, 1]]}, "balls must be rows of 3 numbers; row 1 is not"),
+        ({"balls": [[1, 1, -0.5]]}, "balls[0]: the radius must be at least 0, not -0.5"),
+        ({"balls": [[1, 1, float("inf")]]}, "balls must be finite numbers up to 1e+100"),
         ({"balls": "many"}, "balls must be rows of 3 numbers"),
         ({"balls": True}, "balls must be rows of 3 numbers"),
         ({"boxes": [[0, 0, 1]]}, "boxes must be rows of 4 numbers"),
         ({"boxes": [[0, 0, 0, 1, 1, 1], [2, 2, 2, 3, 3, 3]]}, "boxes must be rows of 4 numbers"),
         ({"boxes": [[3, 0, 2, 1]]}, "boxes[0] has a minimum above its maximum: 3, 0, 2, 1"),
-        ({"boxes": [[0, 0, float("nan"), 1]]}, "boxes must hold finite numbers only"),
+        ({"boxes": [[0, 0, float("nan"), 1]]}, "boxes must be finite numbers up to 1e+100"),
         ({"boxes": {"a": 1}}, "boxes must be rows of 4 numbers"),
         ({"polygon": [[[0, 0], [1, 0]]]}, "unknown field of a world 'polygon'; did you mean"),
         ({"start": [1]}, "start must be"),
         ({"start": []}, "start must be"),
         ({"start": [1, 1, 2, 2]}, "start must be"),
         ({"goal": [1, "x"]}, "goal must be"),
-        ({"goal": [1, float("nan")]}, "goal must hold finite numbers only"),
+        ({"goal": [1, float("nan")]}, "goal must be finite numbers up to 1e+100"),
     ],
 )
 def test_wrong_json(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
@@ -307,7 +307,7 @@ def test_foreign_file(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     path.write_text("wall 0 0 0 1 1 1")
     error = refused(lambda: make_world(str(path)))
-    assert error.startswith(f"{path}: not a world that brrt reads; it reads .json, .txt, .map, ")
+    assert error.startswith(f"{path}: unknown format; brrt loads worlds from .json, .txt, .map, ")
 
 
 @pytest.mark.parametrize("name", ["folder.txt", "folder.json"])
@@ -391,7 +391,7 @@ def test_polygons_are_for_the_plane() -> None:
     corner = [[0, 0], [1, 0], [0, 1]]
     flat, cube = (np.zeros(2), np.ones(2)), (np.zeros(3), np.ones(3))
     why = refused(lambda: World("w", *cube, polygons=(np.array(corner),)))
-    assert "polygons stand in the plane, and this world is 3D" in why
+    assert "polygons are for 2D worlds; this one is 3D" in why
     why = refused(lambda: World("w", *flat, polygons=3))  # type: ignore[arg-type]
     assert "polygons must be a list" in why
 

@@ -13,7 +13,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from brrt.formats.output import Output
+from brrt.files import OutputFile
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -36,7 +36,7 @@ class Container:
         self._position, self._crc = 0, 0
         self._index = _Summary()
         self._prefix = b""
-        self._file = Output(path)
+        self._file = OutputFile(path)
         self._waiting: list[bytes] = []
         self._written = 0
         self._write(MAGIC)
@@ -144,7 +144,7 @@ class Container:
             self._file.write(waiting)
             self._file.appear()
         except OSError:
-            self._file.cut(self._written)
+            self._file.truncate(self._written)
             with suppress(OSError):
                 self._file.close()
             raise

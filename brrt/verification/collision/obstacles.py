@@ -29,7 +29,7 @@ class Obstacles:
 
     def __init__(self, world: World) -> None:
         d, self._own = world.dim, (len(world.boxes), len(world.balls), len(world.polygons))
-        world = world.solid()
+        world = world.without_grid()
         self.boxes, self.balls = world.boxes, world.balls
         self.polygons = [np.asarray(p, np.float64) for p in world.polygons]
         self.ends = np.cumsum([len(self.boxes), len(self.balls), len(self.polygons)])

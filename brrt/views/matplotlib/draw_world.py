@@ -35,7 +35,7 @@ def save_picture(world: World, path: Path) -> None:
     # Very long worlds get a picture that is long, not one that is a line.
     size = np.maximum(np.array([width, height]) / max(width, height), 0.2) * _INCHES
     figure = matplotlib.figure.Figure(figsize=tuple(size), dpi=_DPI)
-    plot(world, figure.add_subplot(projection=None if world.dim == 2 else "3d"))
+    plot_world(world, figure.add_subplot(projection=None if world.dim == 2 else "3d"))
     save_figure(figure, path, bbox_inches="tight")
 
 
@@ -57,7 +57,7 @@ def save_figure(figure: Any, path: Path, **how: Any) -> None:
         figure.savefig(unfinished, metadata=undated, **how)
 
 
-def plot(world: World, ax: Any = None) -> Any:
+def plot_world(world: World, ax: Any = None) -> Any:
     """Draw a world.
 
     Args:
@@ -155,7 +155,7 @@ def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
     from matplotlib.patches import Rectangle  # noqa: PLC0415
     from matplotlib.transforms import Affine2D  # noqa: PLC0415
 
-    if not grid.reaches_all_of(world.lower, world.upper):
+    if not grid.contains_box(world.lower, world.upper):
         (x, y), size = world.lower, world.upper - world.lower
         ax.add_patch(Rectangle((x, y), *size, color=rgb(OBSTACLE), linewidth=0, zorder=-2))
     turned = Affine2D().rotate(grid.yaw).translate(*grid.origin)

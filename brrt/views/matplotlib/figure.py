@@ -13,8 +13,7 @@ from brrt.events import Kind
 from brrt.recording import Recording, check_limits
 from brrt.views.matplotlib import style
 from brrt.views.matplotlib.curves import Against, draw_cost, draw_time
-from brrt.views.matplotlib.draw_world import need_matplotlib, new_axes, save_figure
-from brrt.views.matplotlib.draw_world import plot as plot_world
+from brrt.views.matplotlib.draw_world import need_matplotlib, new_axes, plot_world, save_figure
 from brrt.views.matplotlib.history import Record
 from brrt.views.matplotlib.tree import TreePanel
 from brrt.worlds.world import World

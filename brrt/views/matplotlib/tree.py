@@ -124,7 +124,7 @@ class TreePanel:
     def _draw_world(self) -> None:
         ax, manifest = self._ax, self._record.manifest
         world = replace(self._record.world, start=None, goal=None)
-        draw_world.plot(world, ax)
+        draw_world.plot_world(world, ax)
         obstacles = len(world.balls) + len(world.boxes) + len(world.polygons)
         for artist in ax.collections:
             artist.set_rasterized(obstacles > MOST_VECTORS)

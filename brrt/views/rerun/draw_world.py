@@ -10,8 +10,8 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from brrt.views.colours import FREE, OBSTACLE, OBSTACLE_3D, OUTLINE, Colour
+from brrt.worlds.free_space import occupied
 from brrt.worlds.occupancy import Grid
-from brrt.worlds.survey import covered
 from brrt.worlds.world import World
 
 _CORNERS = 1 / 16, 1 / 4
@@ -197,7 +197,7 @@ def _filled_polygons(world: World) -> Iterator[tuple[str, Any]]:
         "/world/obstacles/inside",
         rr.Transform3D(translation=[*world.lower, 0], scale=pixel),
     )
-    yield "/world/obstacles/inside/pixels", _stencil(covered(hulls, points).reshape(rows, columns))
+    yield "/world/obstacles/inside/pixels", _stencil(occupied(hulls, points).reshape(rows, columns))
     outlines = [np.concatenate([polygon, polygon[:1]]) for polygon in world.polygons]
     radii = [-0.5 if len(polygon) > 2 else -1.5 for polygon in world.polygons]
     yield (

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from brrt.errors import WriteError
-from brrt.formats.output import Output
+from brrt.files import OutputFile
 
 _BLOCK = 1 << 20
 _PAUSE_S = 0.0005
@@ -42,7 +42,7 @@ class Drain:
         self._error: Exception | None = None
         self.size = self.crc = 0
         try:
-            self._file = Output(path)
+            self._file = OutputFile(path)
         except OSError as error:
             raise self._cannot_write(error) from None
         self._inlet: int | None

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from brrt.errors import BrrtError
-from brrt.worlds.raster import Lattice
-from brrt.worlds.shapes import Floats, Ints, Shapes, expanded, portions
+from brrt.worlds.obstacle_arrays import Floats, Ints, ObstacleArray, chunks, expand_counts
+from brrt.worlds.rasterize import Raster
 
 POINTS = 1 << 15
 """Points at which the share is measured, about: one at random in each cell of a lattice."""
@@ -21,7 +21,7 @@ _SPARE = 1.5
 
 
 def fewest(
-    density: float, upper: Floats, obstacles: Iterable[Shapes], most: int
+    density: float, upper: Floats, obstacles: Iterable[ObstacleArray], most: int
 ) -> tuple[int, float]:
     """Count the obstacles of a sequence that are needed to cover a share of the map.
 
@@ -37,7 +37,7 @@ def fewest(
     Raises:
         BrrtError: The sequence does not, or so much of it does not that the rest will not either.
     """
-    lattice = Lattice.over(np.zeros(len(upper)), upper, POINTS)
+    lattice = Raster.over(np.zeros(len(upper)), upper, POINTS)
     index = np.argwhere(np.ones(lattice.shape, np.bool_))
     points = (index + np.random.default_rng(_SEED).random(index.shape)) * lattice.cell
     never = np.iinfo(np.int64).max
@@ -66,7 +66,7 @@ def fewest(
     return count, float((first < count).mean())
 
 
-def _mark(first: Ints, count: int, shapes: Shapes, lattice: Lattice, points: Floats) -> None:
+def _mark(first: Ints, count: int, shapes: ObstacleArray, lattice: Raster, points: Floats) -> None:
     """Note at the points that were not covered which of some more obstacles is the first to do so.
 
     Args:
@@ -78,8 +78,8 @@ def _mark(first: Ints, count: int, shapes: Shapes, lattice: Lattice, points: Flo
     """
     length = lattice.shape[-1]
     for obstacle, row, begin, end in lattice.spans(shapes, np.arange(len(shapes.low))):
-        for part in portions((end - begin + 1) * shapes.weights[obstacle], _PAIRS):
-            owner, offset = expanded((end - begin + 1)[part])
+        for part in chunks((end - begin + 1) * shapes.weights[obstacle], _PAIRS):
+            owner, offset = expand_counts((end - begin + 1)[part])
             point = (row * length + begin)[part][owner] + offset
             left = first[point] >= count
             point, which = point[left], obstacle[part][owner][left]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
-from brrt.worlds.generators.generator import CLEARANCE, Ends, Floats, Scenery, Seeded, no_fit
+from brrt.worlds.generators.generator import CLEARANCE, Floats, ObstacleSet, Query, Seeded, no_fit
 
 _CANDIDATES = 30
 """Places that are tried around a tree before it is taken to be surrounded; Bridson's k."""
@@ -90,7 +90,7 @@ class _Accepted:
 
 
 @dataclass(frozen=True, slots=True)
-class Forest(Seeded):
+class PoissonForest(Seeded):
     """Trees at random places that keep a distance; start and goal stand in opposite corners."""
 
     radius: float | None = param(None, "radius of the trunks; auto: 0.015 of the size", above=0)
@@ -120,7 +120,7 @@ class Forest(Seeded):
         """Distance from the middle of a trunk to that of another."""
         return 2 * self.trunk + (0.05 * self.size if self.gap is None else self.gap)
 
-    def trees(self, rng: np.random.Generator, ends: Ends) -> Floats:
+    def trees(self, rng: np.random.Generator, ends: Query) -> Floats:
         """Draw where the middles of the trunks are, shape (n, 2)."""
         reach = self.trunk + CLEARANCE * self.size + ends.room
         kept = np.stack([ends.start[:2], ends.goal[:2]])
@@ -139,19 +139,19 @@ class Forest(Seeded):
 
 
 @dataclass(frozen=True, slots=True)
-class Forest2D(Forest):
+class Forest2D(PoissonForest):
     """Trunks, round, at random places of a square map that keep a distance (Poisson disc)."""
 
     dim: ClassVar[int] = 2
 
-    def scenery(self, rng: np.random.Generator, ends: Ends, /) -> Scenery:
+    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
         """Draw the trees."""
         trees = self.trees(rng, ends)
-        return Scenery(balls=np.column_stack([trees, np.full(len(trees), self.trunk)]))
+        return ObstacleSet(balls=np.column_stack([trees, np.full(len(trees), self.trunk)]))
 
 
 @dataclass(frozen=True, slots=True)
-class Forest3D(Forest):
+class Forest3D(PoissonForest):
     """Upright trunks, square in section, of random heights, that keep a distance (Poisson disc).
 
     Worlds have no cylinders: a trunk is a box whose edges are on the circle of its radius, so that
@@ -165,17 +165,17 @@ class Forest3D(Forest):
 
     def __post_init__(self) -> None:
         """Check the heights as well."""
-        Forest.__post_init__(self)
+        PoissonForest.__post_init__(self)
         if self.min_height > self.max_height:
             raise BrrtError(
                 f"min_height {self.min_height:g} is above max_height {self.max_height:g}; swap them"
             )
 
-    def scenery(self, rng: np.random.Generator, ends: Ends, /) -> Scenery:
+    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
         """Draw the trees, then their heights."""
         trees = self.trees(rng, ends)
         heights = self.size * rng.uniform(self.min_height, self.max_height, len(trees))
         half = self.trunk / np.sqrt(2)
-        return Scenery(
+        return ObstacleSet(
             boxes=np.column_stack([trees - half, np.zeros(len(trees)), trees + half, heights])
         )

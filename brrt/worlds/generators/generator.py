@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import Settings, param
-from brrt.worlds.survey import connected
+from brrt.worlds.free_space import connected
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ _DRAWS = 100
 """Draws of a random world before it is said to have no way."""
 
 
-class Ends(NamedTuple):
+class Query(NamedTuple):
     """Where a query starts and ends, shape (d,) each, and the room that a body needs there."""
 
     start: Floats
@@ -30,7 +30,7 @@ class Ends(NamedTuple):
     room: float
 
 
-class Scenery(NamedTuple):
+class ObstacleSet(NamedTuple):
     """What stands in a world, and what the user should know of it; see `World`."""
 
     balls: Floats = np.empty((0, 0))
@@ -49,7 +49,7 @@ class Generator(Settings):
     connected: bool = param(False, "make sure that a way leads from start to goal, for a point")
 
     @abstractmethod
-    def sceneries(self, ends: Ends, /) -> Iterator[Scenery]:
+    def sceneries(self, ends: Query, /) -> Iterator[ObstacleSet]:
         """Draw scenery after scenery, as many as there may be."""
 
     def upper(self) -> Floats:
@@ -104,7 +104,7 @@ class Generator(Settings):
         lower, upper = np.zeros(self.dim), self.upper()
         draws, reason = 0, ""
         try:
-            for scenery in self.sceneries(Ends(start, goal, room)):
+            for scenery in self.sceneries(Query(start, goal, room)):
                 world = World(name, lower, upper, start=start, goal=goal, **scenery._asdict())
                 if not self.connected:
                     return world
@@ -131,10 +131,10 @@ class Seeded(Generator):
     seed: int = param(0, "seed of what is random", low=0)
 
     @abstractmethod
-    def scenery(self, rng: np.random.Generator, ends: Ends, /) -> Scenery:
+    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
         """Draw what stands in the world."""
 
-    def sceneries(self, ends: Ends, /) -> Iterator[Scenery]:
+    def sceneries(self, ends: Query, /) -> Iterator[ObstacleSet]:
         """Draw from the seed itself, then from seeds derived from it."""
         yield self.scenery(np.random.default_rng(self.seed), ends)
         for derived in np.random.SeedSequence(self.seed).spawn(_DRAWS - 1):
@@ -146,10 +146,10 @@ class Fixed(Generator):
     """A world in which nothing is random."""
 
     @abstractmethod
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Say what stands in the world."""
 
-    def sceneries(self, _ends: Ends, /) -> Iterator[Scenery]:
+    def sceneries(self, _ends: Query, /) -> Iterator[ObstacleSet]:
         """There is but one."""
         yield self.layout()
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
-from brrt.worlds.generators.carving import merged
-from brrt.worlds.generators.generator import Ends, Fixed, Floats, Scenery, Seeded
+from brrt.worlds.generators.box_subtraction import merge_cells
+from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet, Query, Seeded
 
 Pairs = NDArray[np.int64]
 _WALL = 0.1
@@ -66,7 +66,7 @@ def walls_of(shape: tuple[int, ...], pairs: Pairs, edges: Floats) -> Floats:
     blocked[(slice(None, None, 2),) * len(shape)] = False
     one, other = (np.array(np.unravel_index(cells, shape)) for cells in pairs.T)
     blocked[tuple(one + other)] = False
-    return merged(blocked, edges)
+    return merge_cells(blocked, edges)
 
 
 def _edges(size: float, cells: int, wall: float) -> Floats:
@@ -125,11 +125,11 @@ class Maze(Seeded):
         first, last = edges[:2].mean(), edges[-2:].mean()
         return np.full(self.dim, first), np.full(self.dim, last)
 
-    def scenery(self, rng: np.random.Generator, _ends: Ends, /) -> Scenery:
+    def scenery(self, rng: np.random.Generator, _ends: Query, /) -> ObstacleSet:
         """Draw the ways between cells, and wall off the rest."""
         shape = (self.cells,) * self.dim
         edges = _edges(self.size, self.cells, self.thickness)
-        return Scenery(boxes=walls_of(shape, spanning_tree(shape, rng), edges))
+        return ObstacleSet(boxes=walls_of(shape, spanning_tree(shape, rng), edges))
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +191,7 @@ class Rooms2D(Seeded):
         """Return the middle of two opposite corner rooms."""
         return np.full(2, self.side / 2), np.full(2, self.size - self.side / 2)
 
-    def scenery(self, rng: np.random.Generator, _ends: Ends, /) -> Scenery:
+    def scenery(self, rng: np.random.Generator, _ends: Query, /) -> ObstacleSet:
         """Draw which walls have doors and where, and build what is left of them."""
         shape = (self.rooms, self.rooms)
         open_ = np.zeros((2, self.rooms, self.rooms), np.bool_)
@@ -201,7 +201,7 @@ class Rooms2D(Seeded):
         places = rng.random(open_.shape)
         walls = [self._wall(0, i, open_[0, i], places[0, i]) for i in range(self.rooms - 1)]
         walls += [self._wall(1, i, open_[1, :, i], places[1, :, i]) for i in range(self.rooms - 1)]
-        return Scenery(boxes=np.concatenate([np.empty((0, 4)), *walls]))
+        return ObstacleSet(boxes=np.concatenate([np.empty((0, 4)), *walls]))
 
     def _wall(self, axis: int, i: int, open_: NDArray[np.bool_], places: Floats) -> Floats:
         """Return the wall behind the rooms of row i, across the map, but for its doors."""
@@ -247,7 +247,7 @@ class Spiral2D(Fixed):
         first = _edges(self.size, self.cells, self.thickness)[:2].mean()
         return np.full(2, first), np.full(2, self.size / 2)
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Walk inwards along the cells that were not visited, always turning left."""
         shape = (self.cells, self.cells)
         left = np.arange(self.cells**2).reshape(shape)
@@ -258,4 +258,4 @@ class Spiral2D(Fixed):
         cells = np.concatenate(way)
         pairs = np.stack([cells[:-1], cells[1:]], axis=1)
         edges = _edges(self.size, self.cells, self.thickness)
-        return Scenery(boxes=walls_of(shape, pairs, edges))
+        return ObstacleSet(boxes=walls_of(shape, pairs, edges))

@@ -13,13 +13,13 @@ from brrt.settings import param
 from brrt.worlds.generators.density import fewest
 from brrt.worlds.generators.generator import (
     CLEARANCE,
-    Ends,
     Floats,
-    Scenery,
+    ObstacleSet,
+    Query,
     Seeded,
     no_fit,
 )
-from brrt.worlds.shapes import Shapes, shapes_of
+from brrt.worlds.obstacle_arrays import ObstacleArray, obstacle_arrays
 from brrt.worlds.world import World
 
 _REDRAWS = 1000
@@ -59,30 +59,30 @@ class Scattered(Seeded):
         """Whether each obstacle comes closer to a point than the clearance."""
 
     @abstractmethod
-    def place(self, centres: Floats, halves: Floats) -> Scenery:
+    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
         """Make obstacles of what was drawn."""
 
-    def scenery(self, rng: np.random.Generator, ends: Ends, /) -> Scenery:
+    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
         """Draw the obstacles: as many as asked for, or as it takes."""
         if self.density is None:
             return self.place(*self._apart(rng, self.n, ends))
         drawn: list[tuple[Floats, Floats]] = []
 
-        def batches() -> Iterator[Shapes]:
+        def batches() -> Iterator[ObstacleArray]:
             count = 0
             while count < _MOST:
                 n = min(_BATCHES[min(len(drawn), len(_BATCHES) - 1)], _MOST - count)
                 count += n
                 drawn.append(self._apart(rng, n, ends))
                 scenery = self.place(*drawn[-1])._asdict()
-                yield from shapes_of(World("", np.zeros(self.dim), self.upper(), **scenery))
+                yield from obstacle_arrays(World("", np.zeros(self.dim), self.upper(), **scenery))
 
         count, share = fewest(self.density, self.upper(), batches(), _MOST)
         centres, halves = (np.concatenate(parts)[:count] for parts in zip(*drawn, strict=True))
         note = f"density {self.density:g} asked for: {count} obstacles cover {share:.4f} of the map"
         return self.place(centres, halves)._replace(notes=(note,))
 
-    def _apart(self, rng: np.random.Generator, n: int, ends: Ends) -> tuple[Floats, Floats]:
+    def _apart(self, rng: np.random.Generator, n: int, ends: Query) -> tuple[Floats, Floats]:
         """Draw n obstacles that keep off start and goal."""
         clearance = CLEARANCE * self.size + ends.room
         centres, halves = self.draw(rng, n)
@@ -104,7 +104,7 @@ class Scattered(Seeded):
 
 
 @dataclass(frozen=True, slots=True)
-class Balls(Scattered):
+class ScatteredBalls(Scattered):
     """Circles or spheres with radii spread evenly over a range."""
 
     min_radius: float = param(1.0, "least radius", above=0)
@@ -128,14 +128,14 @@ class Balls(Scattered):
         reach = halves[:, 0] + clearance
         return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
-    def place(self, centres: Floats, halves: Floats) -> Scenery:
+    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
         """Write each ball as centre and radius."""
         balls = np.concatenate([centres, halves[:, :1]], axis=1)
-        return Scenery(balls=balls)
+        return ObstacleSet(balls=balls)
 
 
 @dataclass(frozen=True, slots=True)
-class Boxes(Scattered):
+class ScatteredBoxes(Scattered):
     """Axis-aligned boxes with sides spread evenly over a range."""
 
     cubes: ClassVar[bool] = False
@@ -162,10 +162,10 @@ class Boxes(Scattered):
         near = np.abs(centres - point) <= halves + clearance
         return np.asarray(near.all(axis=1))
 
-    def place(self, centres: Floats, halves: Floats) -> Scenery:
+    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
         """Write each box as its least and greatest corner."""
         boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-        return Scenery(boxes=boxes)
+        return ObstacleSet(boxes=boxes)
 
 
 def _check_sizes(what: str, least: float, greatest: float, limit: float) -> None:
@@ -176,14 +176,14 @@ def _check_sizes(what: str, least: float, greatest: float, limit: float) -> None
 
 
 @dataclass(frozen=True, slots=True)
-class Circles2D(Balls):
+class Circles2D(ScatteredBalls):
     """Circles on a square map."""
 
     dim: ClassVar[int] = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Squares2D(Boxes):
+class Squares2D(ScatteredBoxes):
     """Axis-aligned squares on a square map."""
 
     dim: ClassVar[int] = 2
@@ -191,21 +191,21 @@ class Squares2D(Boxes):
 
 
 @dataclass(frozen=True, slots=True)
-class Boxes2D(Boxes):
+class Boxes2D(ScatteredBoxes):
     """Axis-aligned rectangles on a square map."""
 
     dim: ClassVar[int] = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Boxes3D(Boxes):
+class Boxes3D(ScatteredBoxes):
     """Axis-aligned boxes in a cube."""
 
     dim: ClassVar[int] = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Spheres3D(Balls):
+class Spheres3D(ScatteredBalls):
     """Spheres in a cube."""
 
     dim: ClassVar[int] = 3
@@ -247,10 +247,10 @@ class Polygons2D(Scattered):
         reach = halves[:, 0] + clearance
         return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
-    def place(self, centres: Floats, halves: Floats) -> Scenery:
+    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
         """Put the corners of each polygon on its circle."""
         polygons = []
         for centre, (radius, corners, *angles) in zip(centres, halves, strict=True):
             around = np.array(angles[: int(corners)])
             polygons.append(centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1))
-        return Scenery(polygons=tuple(polygons))
+        return ObstacleSet(polygons=tuple(polygons))

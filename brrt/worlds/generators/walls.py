@@ -6,17 +6,17 @@ from typing import ClassVar
 import numpy as np
 
 from brrt.settings import param
-from brrt.worlds.generators.carving import without
-from brrt.worlds.generators.generator import Fixed, Floats, Scenery, no_fit
+from brrt.worlds.generators.box_subtraction import subtract_box
+from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet, no_fit
 
 
 @dataclass(frozen=True, slots=True)
 class Empty(Fixed):
     """Nothing but bounds; start and goal stand in opposite corners."""
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Leave the map empty."""
-        return Scenery()
+        return ObstacleSet()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Empty3D(Empty):
 
 
 @dataclass(frozen=True, slots=True)
-class Gap(Fixed):
+class GapWall(Fixed):
     """A wall across the middle of the map with one square gap; start and goal stand in corners."""
 
     usual: ClassVar[tuple[float, float]] = (0.06, 0.04)
@@ -72,25 +72,25 @@ class Gap(Fixed):
         """Return opposite corners; no more than half way to the wall."""
         return self.corners(room, (1 - self.thickness / self.size) / 4)
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Build the wall around the gap."""
         first = np.array(self.places()) * (self.size - self.width)
         low, high = np.zeros(self.dim), np.full(self.dim, self.size)
         low[0] = (self.size - self.thickness) / 2
         high[0] = (self.size + self.thickness) / 2
         hole = [[low[0], *first], [high[0], *(first + self.width)]]
-        return Scenery(boxes=without(low, high, hole))
+        return ObstacleSet(boxes=subtract_box(low, high, hole))
 
 
 @dataclass(frozen=True, slots=True)
-class Gap2D(Gap):
+class Gap2D(GapWall):
     """A wall across a square map with one gap."""
 
     dim: ClassVar[int] = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Gap3D(Gap):
+class Gap3D(GapWall):
     """A wall across a cube with one square gap."""
 
     dim: ClassVar[int] = 3
@@ -165,7 +165,7 @@ class Walls(Fixed):
         """Return opposite corners; no more than half way to the next wall."""
         return self.corners(room, 0.05 + (self.pitch - self.thickness) / self.size / 4)
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Build wall after wall, along x."""
         boxes = [np.empty((0, 2 * self.dim))]
         for i in range(self.walls):
@@ -175,8 +175,8 @@ class Walls(Fixed):
             hole = np.stack([low, high])
             axis, at_end = self.sides[i % len(self.sides)]
             hole[:, axis] = (self.size - self.width, self.size) if at_end else (0.0, self.width)
-            boxes.append(without(low, high, hole))
-        return Scenery(boxes=np.concatenate(boxes))
+            boxes.append(subtract_box(low, high, hole))
+        return ObstacleSet(boxes=np.concatenate(boxes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +230,7 @@ class Enclosure(Fixed):
         start[0], goal[0] = 0.25 * self.size, 0.75 * self.size
         return start, goal
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Build the box of the start, and its mirror image."""
         middle, _ = self.ends(0.0)
         inner = self.outside / 2 - self.thickness
@@ -238,7 +238,7 @@ class Enclosure(Fixed):
         boxes = shell(middle, self.outside, self.thickness, gap)
         mirror = boxes.copy()
         mirror[:, 0], mirror[:, self.dim] = self.size - boxes[:, self.dim], self.size - boxes[:, 0]
-        return Scenery(boxes=np.concatenate([boxes, mirror]))
+        return ObstacleSet(boxes=np.concatenate([boxes, mirror]))
 
 
 def shell(middle: Floats, side: float, wall: float, gap: float) -> Floats:
@@ -261,7 +261,7 @@ def shell(middle: Floats, side: float, wall: float, gap: float) -> Floats:
     opening = np.stack([middle - gap / 2, middle + gap / 2])
     opening[:, 0] = low[0], front[0]
     hollow = np.stack([low + wall, high - wall])
-    return np.concatenate([without(low, front, opening), without(rest, high, hollow)])
+    return np.concatenate([subtract_box(low, front, opening), subtract_box(rest, high, hollow)])
 
 
 @dataclass(frozen=True, slots=True)

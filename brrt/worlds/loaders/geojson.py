@@ -1,6 +1,5 @@
 """Polygons of GeoJSON files (RFC 7946), cut into convex pieces."""
 
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -8,15 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.files import parse_json, read_text
 from brrt.settings import param
-from brrt.worlds.convex import GREATEST
-from brrt.worlds.loaders.loader import Loader, json_text, nothing_to_choose
+from brrt.worlds.arrays import Floats, read_numbers
+from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
 from brrt.worlds.world import World
-
-Floats = NDArray[np.float64]
 
 _MEMBERS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 _KINDS = ("FeatureCollection", "Feature", "GeometryCollection", "MultiPolygon", "Polygon")
@@ -74,14 +71,11 @@ class GeoJson(Loader):
             BrrtError: It is no GeoJSON, a polygon crosses itself, or shapely is not there.
         """
         nothing_to_choose(path, query)
-        try:
-            data = json.loads(json_text(path))
-        except (ValueError, RecursionError) as error:
-            raise BrrtError(f"{path}: not JSON: {str(error)[:120]}") from None
+        data = parse_json(read_text(path, "a world", MOST_BYTES), "JSON")
         found = _Found()
         _collect(found, str(path), "", data, 0)
         try:
-            from brrt.worlds.loaders.pieces import convex_pieces  # noqa: PLC0415 - shapely
+            from brrt.worlds.loaders.convex_decomposition import convex_pieces  # noqa: PLC0415 - shapely
         except ImportError:
             raise BrrtError(
                 f"{path}: reading GeoJSON needs shapely: pip install 'brrt[geojson]'"
@@ -186,15 +180,8 @@ def _list(where: str, values: Any) -> Iterator[Any]:
 
 def _positions(where: str, values: Any, lengths: tuple[int, ...]) -> Floats:
     """Read rows of numbers, all of one of the lengths; shape (n, length)."""
-    what = f"{where} must be positions of {' or '.join(map(str, lengths))} numbers"
-    if not isinstance(values, list) or not values:
-        raise BrrtError(what)
-    try:
-        rows = np.array(values, np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise BrrtError(what) from None
-    if rows.ndim != 2 or rows.shape[1] not in lengths:
-        raise BrrtError(what)
-    if not (np.abs(rows) <= GREATEST).all():
-        raise BrrtError(f"{where} must hold finite numbers up to {GREATEST:g} only")
+    what = f"positions of {' or '.join(map(str, lengths))} numbers"
+    rows = read_numbers(where, values, what, (None, None))
+    if rows.shape[1] not in lengths:
+        raise BrrtError(f"{where} must be {what}")
     return rows

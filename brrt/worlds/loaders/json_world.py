@@ -4,7 +4,8 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from brrt.worlds.loaders.loader import Loader, json_text, nothing_to_choose
+from brrt.files import read_text
+from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
 from brrt.worlds.world import World
 
 
@@ -28,4 +29,4 @@ class JsonWorld(Loader):
             BrrtError: The text is not such a world.
         """
         nothing_to_choose(path, query)
-        return replace(World.from_json(json_text(path)), name=str(path))
+        return replace(World.from_json(read_text(path, "a world", MOST_BYTES)), name=str(path))

@@ -4,18 +4,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from brrt.errors import BrrtError
-from brrt.files import is_file, is_there, read_text
+from brrt.files import is_there
 from brrt.settings import Settings
-from brrt.worlds.convex import GREATEST
+from brrt.worlds.arrays import GREATEST
 from brrt.worlds.world import World
 
 MOST_BYTES = 64_000_000
 """Bytes of a text file, at most."""
-MOST_LISTS = 5_000_000
-"""In JSON, each of which takes a hundred bytes once it is parsed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,53 +44,6 @@ class Loader(Settings):
             BrrtError: The file cannot be read, or is not a world.
         """
         raise NotImplementedError
-
-
-class FileSpec(NamedTuple):
-    """A world file as a user names it: `FILE[:name=value,...][#query]`."""
-
-    path: Path
-    params: str
-    query: str
-
-    @classmethod
-    def parse(cls, spec: str) -> "FileSpec":
-        """Take a name apart; what exists as a file is never taken apart further.
-
-        Where nothing exists, the file ends before the first `:name=` or the last `#`.
-        """
-        if is_there(spec):
-            return cls(Path(spec), "", "")
-        cuts = [i for i, letter in enumerate(spec) if letter in ":#"]
-        there = [i for i in cuts if is_file(spec[:i])]
-        if there:
-            cut = there[-1]
-        else:
-            named = [i for i in cuts if _is_cut(spec, i)]
-            cut = named[0] if named else len(spec)
-        path, rest = Path(spec[:cut]), spec[cut:]
-        if rest.startswith("#"):
-            return cls(path, "", rest[1:])
-        params, number, query = rest[1:].rpartition("#")
-        return cls(path, params, query) if number else cls(path, query, "")
-
-
-def _is_cut(spec: str, i: int) -> bool:
-    """Whether parameters or a query could begin at a `:` or `#`; not at that of `C:`."""
-    name, equals, _ = spec[i + 1 :].partition("=")
-    return spec[i] == "#" or bool(equals and name.strip().isidentifier())
-
-
-def json_text(path: Path) -> str:
-    """Read a file of JSON that will not take gigabytes once it is parsed.
-
-    Raises:
-        BrrtError: It cannot be read, is too long, or holds millions of lists.
-    """
-    text = read_text(path, "a world", MOST_BYTES)
-    if text.count("[") + text.count("{") > MOST_LISTS:
-        raise BrrtError(f"{path}: more than {MOST_LISTS:,} lists; that is too much for a world")
-    return text
 
 
 def nothing_to_choose(path: Path, query: str) -> None:

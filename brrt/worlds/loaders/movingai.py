@@ -59,7 +59,7 @@ class GridMap(Loader):
 
 
 @dataclass(frozen=True, slots=True)
-class Scenarios(Loader):
+class GridScenarios(Loader):
     """Queries on MovingAI maps: `x.scen#12` is the 12th from 0, `x.scen#bucket=3` its first.
 
     Start and goal are cell centres. The map is looked for in the folder of the file, by its path

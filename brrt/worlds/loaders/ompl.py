@@ -30,7 +30,7 @@ _MOST = 10**9
 
 
 @dataclass(frozen=True, slots=True)
-class Circles(Loader):
+class OmplCircles(Loader):
     """2D circles of OMPL's tests: rows `i x y r`; a file of queries takes the circles beside it.
 
     The bounds are those of the circles, as in OMPL. `circle_queries.txt#7` is query 7, with the

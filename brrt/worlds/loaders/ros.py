@@ -18,7 +18,7 @@ from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
 if TYPE_CHECKING:
-    from brrt.worlds.loaders.fields import Fields
+    from brrt.worlds.loaders.yaml_fields import YamlFields
 
 _MOST_BYTES = 64_000
 """Real ones have 200."""
@@ -63,10 +63,10 @@ class RosMap(Loader):
         Raises:
             BrrtError: A field is missing or of no use, or so is the image.
         """
-        from brrt.worlds.loaders.fields import Fields  # noqa: PLC0415 - yaml is slow to import
+        from brrt.worlds.loaders.yaml_fields import YamlFields  # noqa: PLC0415 - yaml is slow to import
 
         nothing_to_choose(path, query)
-        fields = Fields.read(path, _MOST_BYTES)
+        fields = YamlFields.read(path, _MOST_BYTES)
         for name in _NEEDED:
             if name not in fields.nodes:
                 raise BrrtError(f"{path}: the field {name!r} is missing; a map has one")
@@ -86,7 +86,7 @@ class RosMap(Loader):
         notes = self._notes(path, fields, int(dark.sum()), dark.size)
         return World.of_grid(str(path), grid, notes=tuple(notes))
 
-    def _notes(self, path: Path, fields: "Fields", dark: int, cells: int) -> Iterator[str]:
+    def _notes(self, path: Path, fields: "YamlFields", dark: int, cells: int) -> Iterator[str]:
         strange = [name for name in fields.nodes if name not in (*_NEEDED, "mode")]
         for name in strange[:_MOST_NOTES]:
             line = fields.nodes[name].start_mark.line + 1
@@ -98,7 +98,7 @@ class RosMap(Loader):
                 f"{path}:unknown={other} makes them {other}"
             )
 
-    def _pixels(self, path: Path, fields: "Fields") -> Pixels:
+    def _pixels(self, path: Path, fields: "YamlFields") -> Pixels:
         if self.image is not None:
             return read_pixels(named_by_user(path, self.image))
         where, name = fields.where("image"), fields.text("image")
@@ -140,7 +140,7 @@ def occupancy(
     return values
 
 
-def _thresholds(fields: "Fields") -> tuple[float, float]:
+def _thresholds(fields: "YamlFields") -> tuple[float, float]:
     """Return the occupied and the free threshold."""
     occupied, free = fields.number("occupied_thresh"), fields.number("free_thresh")
     for name, value in (("occupied_thresh", occupied), ("free_thresh", free)):
@@ -153,14 +153,14 @@ def _thresholds(fields: "Fields") -> tuple[float, float]:
     return occupied, free
 
 
-def _negate(fields: "Fields") -> bool:
+def _negate(fields: "YamlFields") -> bool:
     word = fields.text("negate").lower()
     if word not in _TRUTH:
         raise BrrtError(f"{fields.where('negate')} must be 0 or 1, not {word[:40]!r}")
     return _TRUTH[word]
 
 
-def _mode(fields: "Fields") -> str:
+def _mode(fields: "YamlFields") -> str:
     mode = fields.text("mode") if "mode" in fields.nodes else "trinary"
     if mode not in _MODES:
         raise BrrtError(

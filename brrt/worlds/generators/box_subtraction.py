@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
-def without(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
+def subtract_box(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
     """Return the boxes that fill a box but for a hole; none of them is flat.
 
     Args:
@@ -32,7 +32,7 @@ def without(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
     return np.array(boxes).reshape(-1, 2 * len(low))
 
 
-def merged(blocked: NDArray[np.bool_], edges: Floats) -> Floats:
+def merge_cells(blocked: NDArray[np.bool_], edges: Floats) -> Floats:
     """Return few boxes that fill the blocked cells of a lattice and no others.
 
     Cells become runs along the first axis, equal runs that touch become plates along the next.

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brrt.worlds.raster import Lattice, components
-from brrt.worlds.shapes import Bools, Floats, Ints, shapes_of
-from brrt.worlds.survey import map_alone, settled
+from brrt.worlds.free_space import grid_only, nearest_free_cell
+from brrt.worlds.obstacle_arrays import Bools, Floats, Ints, obstacle_arrays
+from brrt.worlds.rasterize import Raster, components
 from brrt.worlds.world import World
 
 Cell = tuple[int, ...]
@@ -60,7 +60,7 @@ class Passage:
     high: float
     place: Floats
     cell: float
-    lattice: Lattice
+    lattice: Raster
     behind: Bools
     neck: Floats
 
@@ -103,24 +103,24 @@ def narrowest(world: World, start: Floats, goal: Floats) -> Passage | None:
 
 def _lattices(
     world: World, start: Floats, goal: Floats
-) -> Iterator[tuple[Lattice, Bools, tuple[Cell, Cell] | None]]:
+) -> Iterator[tuple[Raster, Bools, tuple[Cell, Cell] | None]]:
     """Yield lattices, which of their cells are free, and the cells of start and goal if free."""
-    grid = map_alone(world)
+    grid = grid_only(world)
     if grid is not None and grid.yaw == 0 and grid.cells.size <= 2 * CELLS[-1]:
         # A map is measured by its own cells: their borders are where its obstacles end.
-        lattice = Lattice(grid.origin, np.full(2, grid.resolution), grid.cells.shape[::-1])
+        lattice = Raster(grid.origin, np.full(2, grid.resolution), grid.cells.shape[::-1])
         here, there = (tuple(lattice.index(end).tolist()) for end in (start, goal))
         yield lattice, ~grid.cells.T, (here, there)
         return
-    obstacles = shapes_of(world.solid())
+    obstacles = obstacle_arrays(world.without_grid())
     for cells in CELLS:
-        lattice = Lattice.over(world.lower, world.upper, cells)
+        lattice = Raster.over(world.lower, world.upper, cells)
         free = ~lattice.blocked(obstacles)
-        one, other = (settled(lattice, free, obstacles, end) for end in (start, goal))
+        one, other = (nearest_free_cell(lattice, free, obstacles, end) for end in (start, goal))
         yield lattice, free, None if one is None or other is None else (one, other)
 
 
-def _measured(lattice: Lattice, free: Bools, ends: tuple[Cell, Cell], farthest: int) -> Passage:
+def _measured(lattice: Raster, free: Bools, ends: tuple[Cell, Cell], farthest: int) -> Passage:
     """Measure the narrowest place among cells that lead from one end to the other."""
     size = float(lattice.cell.max())
     square = clearance(free, lattice.cell, farthest)
@@ -156,8 +156,8 @@ def widest(world: World, start: Floats, goal: Floats, cells: int, enough: float)
         The greatest width, or inf if that is more than `enough`; 0 where not even a point gets
         through.
     """
-    obstacles = shapes_of(world.solid())
-    lattice = Lattice.over(world.lower, world.upper, cells)
+    obstacles = obstacle_arrays(world.without_grid())
+    lattice = Raster.over(world.lower, world.upper, cells)
     size, diagonal = float(lattice.cell.max()), float(np.hypot.reduce(lattice.cell))
     farthest = int(enough / 2 / size) + 2
     square = clearance(~lattice.blocked(obstacles), lattice.cell, farthest)

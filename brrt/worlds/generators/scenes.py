@@ -7,15 +7,15 @@ from typing import ClassVar
 import numpy as np
 
 from brrt.settings import param
-from brrt.worlds.generators.carving import without
-from brrt.worlds.generators.generator import Fixed, Floats, Scenery
+from brrt.worlds.generators.box_subtraction import subtract_box
+from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet
 
 Point = tuple[float, float, float]
 Box = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Course(Fixed):
+class Scene(Fixed):
     """A scene that is given by its numbers, in percent of its longest side."""
 
     dim: ClassVar[int] = 3
@@ -39,13 +39,13 @@ class Course(Fixed):
         scale = self.size / 100
         return np.array(self.start) * scale, np.array(self.goal) * scale
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Scale the obstacles."""
-        return Scenery(boxes=np.array(self.boxes(), np.float64) * (self.size / 100))
+        return ObstacleSet(boxes=np.array(self.boxes(), np.float64) * (self.size / 100))
 
 
 @dataclass(frozen=True, slots=True)
-class Cube3D(Course):
+class Cube3D(Scene):
     """A single cube between start and goal."""
 
     far: ClassVar[Point] = (100, 60, 60)
@@ -58,7 +58,7 @@ class Cube3D(Course):
 
 
 @dataclass(frozen=True, slots=True)
-class Window3D(Course):
+class Window3D(Scene):
     """A wall with a window in it, a low wall before and a cupboard behind."""
 
     far: ClassVar[Point] = (100, 60, 50)
@@ -67,13 +67,13 @@ class Window3D(Course):
 
     def boxes(self) -> Floats:
         """Return the wall around the window, then what stands before and behind."""
-        wall = without((46, 0, 0), (50, 60, 50), [(46, 18, 24), (50, 30, 36)])
+        wall = subtract_box((46, 0, 0), (50, 60, 50), [(46, 18, 24), (50, 30, 36)])
         others = [(22, 0, 0, 25, 60, 18), (62, 6, 0, 72, 42, 40)]
         return np.concatenate([wall, others])
 
 
 @dataclass(frozen=True, slots=True)
-class Tower3D(Course):
+class Tower3D(Scene):
     """A tower of seven floors; openings in the ceilings lead up, each in another corner."""
 
     far: ClassVar[Point] = (40, 40, 100)
@@ -87,12 +87,12 @@ class Tower3D(Course):
         for floor, (x, y) in enumerate(corners, 1):
             z = 100 * floor / 7
             hole = [(x, y, z - 1), (x + 10, y + 10, z + 1)]
-            floors.append(without((0, 0, z - 1), (40, 40, z + 1), hole))
+            floors.append(subtract_box((0, 0, z - 1), (40, 40, z + 1), hole))
         return np.concatenate(floors)
 
 
 @dataclass(frozen=True, slots=True)
-class Room3D(Course):
+class Room3D(Scene):
     """A furnished room: from under the table, through the door, to behind the sofa."""
 
     far: ClassVar[Point] = (100, 70, 30)
@@ -118,7 +118,7 @@ class Room3D(Course):
             (79, 18, 0, 89, 42, 4.5), (88, 18, 4.5, 91, 42, 9.5), (79, 18, 4.5, 88, 20.5, 7),
             (79, 39.5, 4.5, 88, 42, 7),
         ]  # fmt: skip
-        wall = without((68, 0, 0), (70, 70, 30), [(68, 52, 0), (70, 61, 21)])
+        wall = subtract_box((68, 0, 0), (70, 70, 30), [(68, 52, 0), (70, 61, 21)])
         return np.concatenate([table, chairs, lamp, shelf, counter, sofa, wall])
 
 
@@ -130,7 +130,7 @@ def _chair(x: float, y: float, *, back_first: bool) -> list[Box]:
 
 
 @dataclass(frozen=True, slots=True)
-class Hurdles3D(Course):
+class Hurdles3D(Scene):
     """Hurdles to fly over and beams to fly under, in turn."""
 
     far: ClassVar[Point] = (100, 24, 20)
@@ -146,7 +146,7 @@ class Hurdles3D(Course):
 
 
 @dataclass(frozen=True, slots=True)
-class Offset3D(Course):
+class Offset3D(Scene):
     """Walls with a hole each, now on one side, now on another."""
 
     far: ClassVar[Point] = (100, 40, 40)
@@ -159,5 +159,6 @@ class Offset3D(Course):
         walls = []
         for number, (y, z) in enumerate(holes):
             x = 13 + 14 * number
-            walls.append(without((x, 0, 0), (x + 3, 40, 40), [(x, y, z), (x + 3, y + 8, z + 8)]))
+            hole = [(x, y, z), (x + 3, y + 8, z + 8)]
+            walls.append(subtract_box((x, 0, 0), (x + 3, 40, 40), hole))
         return np.concatenate(walls)

@@ -7,7 +7,15 @@ from typing import Self
 
 import numpy as np
 
-from brrt.worlds.shapes import ROUNDING, Bools, Floats, Ints, Shapes, expanded, portions
+from brrt.worlds.obstacle_arrays import (
+    ROUNDING,
+    Bools,
+    Floats,
+    Ints,
+    ObstacleArray,
+    chunks,
+    expand_counts,
+)
 
 _SLACK = 1e-9
 """Part of a cell by which cells are taken to be larger than they are: more than rounding loses."""
@@ -17,7 +25,7 @@ _LONGEST = 1e100
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice:
+class Raster:
     """Equal cells that fill a box; `row` means all cells along the last axis.
 
     Attributes:
@@ -53,7 +61,7 @@ class Lattice:
         """Return the least and the greatest corner of cells, shape (..., d) each."""
         return self.lower + index * self.cell, self.lower + (index + 1) * self.cell
 
-    def spans(self, shapes: Shapes, which: Ints) -> Iterator[tuple[Ints, Ints, Ints, Ints]]:
+    def spans(self, shapes: ObstacleArray, which: Ints) -> Iterator[tuple[Ints, Ints, Ints, Ints]]:
         """Find the cells that obstacles touch, row by row; a few that they nearly touch as well.
 
         Yields:
@@ -66,8 +74,8 @@ class Lattice:
         first = self.index(shapes.low[which] - slack)[:, :-1]
         count = self.index(shapes.high[which] + slack)[:, :-1] - first + 1
         rows = count.prod(axis=1)
-        for part in portions(rows * shapes.weights[which], _PORTION):
-            owner, offset = expanded(rows[part])
+        for part in chunks(rows * shapes.weights[which], _PORTION):
+            owner, offset = expand_counts(rows[part])
             at = first[part][owner]
             if at.shape[1] == 1:
                 at[:, 0] += offset
@@ -90,7 +98,7 @@ class Lattice:
         upper = self.lower + self.cell * self.shape
         return _SLACK * self.cell + ROUNDING * np.maximum(np.abs(self.lower), np.abs(upper))
 
-    def blocked(self, obstacles: list[Shapes]) -> Bools:
+    def blocked(self, obstacles: list[ObstacleArray]) -> Bools:
         """Whether any obstacle touches, or nearly touches, each closed cell; shape `shape`."""
         length = self.shape[-1] + 1
         steps = np.zeros(int(np.prod(self.shape[:-1])) * length, np.int64)
@@ -101,7 +109,7 @@ class Lattice:
         depth = np.cumsum(steps.reshape(-1, length), axis=1)[:, :-1]
         return np.asarray((depth > 0).reshape(self.shape))
 
-    def filled(self, obstacles: list[Shapes]) -> Bools:
+    def filled(self, obstacles: list[ObstacleArray]) -> Bools:
         """Whether one obstacle fills each closed cell; shape `shape`.
 
         Obstacles are convex: one that touches all corners of a cell, which is taken to be a little
@@ -112,8 +120,8 @@ class Lattice:
         for shapes in obstacles:
             large = np.flatnonzero((shapes.high - shapes.low >= self.cell).all(axis=1))
             for which, row, begin, end in self.spans(shapes, large):
-                for part in portions(end - begin + 1, _PORTION):
-                    owner, offset = expanded((end - begin + 1)[part])
+                for part in chunks(end - begin + 1, _PORTION):
+                    owner, offset = expand_counts((end - begin + 1)[part])
                     cell = row[part][owner] * self.shape[-1] + begin[part][owner] + offset
                     index = np.stack(np.unravel_index(cell, self.shape), axis=1)
                     inside = np.ones(len(cell), np.bool_)
@@ -126,7 +134,7 @@ class Lattice:
         return found.reshape(self.shape)
 
 
-def touches_box(obstacles: list[Shapes], low: Floats, high: Floats) -> bool:
+def touches_box(obstacles: list[ObstacleArray], low: Floats, high: Floats) -> bool:
     """Whether any obstacle touches, or nearly touches, a closed box; corners of shape (d,)."""
     slack = ROUNDING * np.maximum(np.abs(low), np.abs(high)).max()
     low, high = low - slack, high + slack
@@ -198,4 +206,4 @@ def _distinct(values: Ints, count: int) -> int:
     return int(seen.sum())
 
 
-__all__ = ["Lattice", "components", "touches_box"]
+__all__ = ["Raster", "components", "touches_box"]

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from brrt.settings import param
-from brrt.worlds.generators.carving import without
-from brrt.worlds.generators.generator import Fixed, Floats, Scenery, no_fit
+from brrt.worlds.generators.box_subtraction import subtract_box
+from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet, no_fit
 from brrt.worlds.generators.walls import shell
 
 _LIPS = np.deg2rad(150)
@@ -65,7 +65,7 @@ class BugTrap(Fixed):
         return start, goal
 
     @abstractmethod
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Build the trap."""
 
 
@@ -75,7 +75,7 @@ class BugTrap2D(BugTrap):
 
     dim: ClassVar[int] = 2
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Build a strip along a line: inlet, funnel, lip, around the back, and the same again."""
         radius = (self.across - self.thickness) / 2
         beside = (self.inlet + self.thickness) / 2
@@ -87,7 +87,7 @@ class BugTrap2D(BugTrap):
             ]
         )
         line = np.concatenate([half[:0:-1] * [1, -1], half])
-        return Scenery(polygons=tuple(strip(line, self.thickness) + self.size / 2))
+        return ObstacleSet(polygons=tuple(strip(line, self.thickness) + self.size / 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ class BugTrap3D(BugTrap):
 
     dim: ClassVar[int] = 3
 
-    def layout(self) -> Scenery:
+    def layout(self) -> ObstacleSet:
         """Build the cube with a mouth, and rings from there inwards, each narrower."""
         middle = np.full(3, self.size / 2)
         mouth = 0.5 * self.across
@@ -109,8 +109,8 @@ class BugTrap3D(BugTrap):
             high[0] = low[0] + length
             hole = np.stack([middle - width / 2, middle + width / 2])
             hole[:, 0] = low[0], high[0]
-            boxes.append(without(low, high, hole))
-        return Scenery(boxes=np.concatenate(boxes))
+            boxes.append(subtract_box(low, high, hole))
+        return ObstacleSet(boxes=np.concatenate(boxes))
 
 
 def strip(line: Floats, width: float) -> Floats:

@@ -18,7 +18,7 @@ _SAFE = 2e-15
 """A polygon touches what is nearer than this part of the lengths at hand; see `convex.gap`."""
 
 
-class Shapes(Protocol):
+class ObstacleArray(Protocol):
     """Obstacles of one kind.
 
     Attributes:
@@ -47,7 +47,7 @@ class Shapes(Protocol):
         """Whether obstacle i[j] touches point j; shapes (k,) and (k, d)."""
 
 
-class Boxes:
+class BoxArray:
     """Axis-aligned boxes."""
 
     def __init__(self, boxes: Floats) -> None:
@@ -55,7 +55,7 @@ class Boxes:
         self.weights = np.ones(len(boxes), np.int64)
 
     def reach(self, i: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """See `Shapes`."""
+        """See `ObstacleArray`."""
         apart = ((self.high[i, :-1] < low) | (high < self.low[i, :-1])).any(axis=1)
         return (
             np.where(apart, np.inf, self.low[i, -1]),
@@ -63,11 +63,11 @@ class Boxes:
         )
 
     def touch(self, i: Ints, points: Floats) -> Bools:
-        """See `Shapes`."""
+        """See `ObstacleArray`."""
         return np.asarray(((self.low[i] <= points) & (points <= self.high[i])).all(axis=1))
 
 
-class Balls:
+class BallArray:
     """Circles or spheres."""
 
     def __init__(self, balls: Floats) -> None:
@@ -77,7 +77,7 @@ class Balls:
         self.weights = np.ones(len(balls), np.int64)
 
     def reach(self, i: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """See `Shapes`."""
+        """See `ObstacleArray`."""
         centres = self._centres[i]
         across = centres[:, :-1]
         # Rounding may make the distance to the slab too large: the radius makes up for it.
@@ -89,18 +89,18 @@ class Balls:
         return centres[:, -1] - half, centres[:, -1] + half
 
     def touch(self, i: Ints, points: Floats) -> Bools:
-        """See `Shapes`."""
+        """See `ObstacleArray`."""
         return np.asarray(((points - self._centres[i]) ** 2).sum(axis=1) <= self._radii[i] ** 2)
 
 
-class Polygons:
+class PolygonArray:
     """Convex polygons and line segments in the plane."""
 
     def __init__(self, polygons: tuple[Floats, ...]) -> None:
         # What belongs to polygon i stands from first[i] on, one beside the other.
         self.weights = np.array([len(polygon) for polygon in polygons])
         self._first = np.cumsum(self.weights) - self.weights
-        owner, offset = expanded(self.weights)
+        owner, offset = expand_counts(self.weights)
         vertices = np.concatenate(polygons)
         self.low = np.minimum.reduceat(vertices, self._first)
         self.high = np.maximum.reduceat(vertices, self._first)
@@ -126,14 +126,14 @@ class Polygons:
         self._normals = np.concatenate([normals, along[segments]])[order]
         self._sides = np.bincount(owner)
         self._first_side = np.cumsum(self._sides) - self._sides
-        side, offset = expanded(self.weights[owner])
+        side, offset = expand_counts(self.weights[owner])
         height = (local[self._first[owner[side]] + offset] * self._normals[side]).sum(axis=1)
         self._limits = np.maximum.reduceat(height, np.flatnonzero(offset == 0))
 
     def reach(self, i: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """See `Shapes`."""
+        """See `ObstacleArray`."""
         # A shape within a slab is widest at its outline.
-        owner, offset = expanded(self.weights[i])
+        owner, offset = expand_counts(self.weights[i])
         x, y = np.moveaxis(self._edges[self._first[i][owner] + offset], -1, 0)
         # A nearly upright edge crosses the slab's side somewhere along a stretch of y: all of it
         # is within a slab that is wider by the rounding.
@@ -152,8 +152,8 @@ class Polygons:
         return np.minimum.reduceat(least, first), np.maximum.reduceat(most, first)
 
     def touch(self, i: Ints, points: Floats) -> Bools:
-        """See `Shapes`."""
-        owner, offset = expanded(self._sides[i])
+        """See `ObstacleArray`."""
+        owner, offset = expand_counts(self._sides[i])
         side = self._first_side[i][owner] + offset
         local = points - self._origins[i]
         beyond = (local[owner] * self._normals[side]).sum(axis=1) - self._limits[side]
@@ -161,25 +161,25 @@ class Polygons:
         return np.asarray(np.maximum.reduceat(beyond, np.flatnonzero(offset == 0)) <= slack)
 
 
-def shapes_of(world: World) -> list[Shapes]:
+def obstacle_arrays(world: World) -> list[ObstacleArray]:
     """Return a world's obstacles, kind by kind, as far as there are any."""
-    found: list[Shapes] = []
+    found: list[ObstacleArray] = []
     if len(world.balls):
-        found.append(Balls(world.balls))
+        found.append(BallArray(world.balls))
     if len(world.boxes):
-        found.append(Boxes(world.boxes))
+        found.append(BoxArray(world.boxes))
     if world.polygons:
-        found.append(Polygons(world.polygons))
+        found.append(PolygonArray(world.polygons))
     return found
 
 
-def expanded(counts: Ints) -> tuple[Ints, Ints]:
+def expand_counts(counts: Ints) -> tuple[Ints, Ints]:
     """Return for counts[i] items of each i, one after the other, i and the number within i."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def portions(weights: Ints, limit: int) -> Iterator[slice]:
+def chunks(weights: Ints, limit: int) -> Iterator[slice]:
     """Cut items into parts of that weight at most, or of one item that weighs more."""
     ends, begin = np.cumsum(weights), 0
     while begin < len(weights):

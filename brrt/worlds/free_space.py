@@ -8,9 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brrt.worlds.obstacle_arrays import (
+    Bools,
+    Floats,
+    Ints,
+    ObstacleArray,
+    chunks,
+    expand_counts,
+    obstacle_arrays,
+)
 from brrt.worlds.occupancy import Grid
-from brrt.worlds.raster import Lattice, components, touches_box
-from brrt.worlds.shapes import Bools, Floats, Ints, Shapes, expanded, portions, shapes_of
+from brrt.worlds.rasterize import Raster, components, touches_box
 from brrt.worlds.world import World
 
 CELLS = 1 << 20
@@ -41,7 +49,7 @@ class Connection:
     reason: str
 
 
-def covered(world: World, points: Floats) -> Bools:
+def occupied(world: World, points: Floats) -> Bools:
     """Whether each point touches an obstacle; bounds do not matter.
 
     Args:
@@ -53,7 +61,7 @@ def covered(world: World, points: Floats) -> Bools:
     """
     points = np.ascontiguousarray(points, np.float64)
     hit = np.zeros(len(points), np.bool_) if world.grid is None else world.grid.covers(points)
-    for shapes in shapes_of(world):
+    for shapes in obstacle_arrays(world):
         # Large ones first, few at a time: what they cover is not asked about again.
         order = np.argsort(-(shapes.high - shapes.low).prod(axis=1))
         begin, many = 0, _BATCH
@@ -66,9 +74,9 @@ def covered(world: World, points: Floats) -> Bools:
     return hit
 
 
-def _covered_by(shapes: Shapes, which: Ints, points: Floats) -> Bools:
+def _covered_by(shapes: ObstacleArray, which: Ints, points: Floats) -> Bools:
     """Whether any of some obstacles touches each point: it is compared with those in its cell."""
-    lattice = Lattice.over(points.min(axis=0), points.max(axis=0), len(points) // 2 + 1)
+    lattice = Raster.over(points.min(axis=0), points.max(axis=0), len(points) // 2 + 1)
     length, cells = lattice.shape[-1], int(np.prod(lattice.shape))
     cell = np.ravel_multi_index(tuple(lattice.index(points).T), lattice.shape)
     order = np.argsort(cell, kind="stable")
@@ -77,8 +85,8 @@ def _covered_by(shapes: Shapes, which: Ints, points: Floats) -> Bools:
     hit = np.zeros(len(points), np.bool_)
     for obstacle, row, first, last in lattice.spans(shapes, which):
         begin, end = ends[row * length + first], ends[row * length + last + 1]
-        for part in portions((end - begin) * shapes.weights[obstacle], _PAIRS):
-            owner, offset = expanded((end - begin)[part])
+        for part in chunks((end - begin) * shapes.weights[obstacle], _PAIRS):
+            owner, offset = expand_counts((end - begin)[part])
             if len(owner):
                 near = order[begin[part][owner] + offset]
                 touched = shapes.touch(obstacle[part][owner], points[near])
@@ -98,17 +106,17 @@ def free_fraction(world: World, seed: int = 0) -> tuple[float, float]:
         counted. Where no cell's two points differ it is taken to be that of one such cell:
         something may have been missed.
     """
-    grid = map_alone(world)
+    grid = grid_only(world)
     if grid is not None:
         area = grid.resolution**2 * float((~grid.cells).sum())
         return min(area / float((world.upper - world.lower).prod()), 1.0), 0.0
-    if not shapes_of(world) and world.grid is None:
+    if not obstacle_arrays(world) and world.grid is None:
         return 1.0, 0.0
-    lattice = Lattice.over(world.lower, world.upper, _STRATA)
+    lattice = Raster.over(world.lower, world.upper, _STRATA)
     index = np.stack(np.unravel_index(np.arange(np.prod(lattice.shape)), lattice.shape), axis=1)
     rng = np.random.default_rng(seed)
     pair = [lattice.lower + (index + rng.random(index.shape)) * lattice.cell for _ in range(2)]
-    one, other = (~covered(world, points) for points in pair)
+    one, other = (~occupied(world, points) for points in pair)
     differing = int((one != other).sum())
     # The variance within a cell is estimated by half the square of the difference of its two.
     error = np.sqrt(max(differing, 1)) / (2 * len(index))
@@ -128,8 +136,8 @@ def connected(world: World, start: Floats, goal: Floats, cells: int = CELLS) -> 
         goal: Where it should end, shape (d,).
         cells: Cells of the finest lattice.
     """
-    ends, grid = np.array([start, goal], np.float64), map_alone(world)
-    for name, point, hit in zip(("start", "goal"), ends, covered(world, ends), strict=True):
+    ends, grid = np.array([start, goal], np.float64), grid_only(world)
+    for name, point, hit in zip(("start", "goal"), ends, occupied(world, ends), strict=True):
         if not world.inside(point):
             return Connection(False, 0.0, f"the {name} lies outside the bounds")
         if hit:
@@ -138,9 +146,9 @@ def connected(world: World, start: Floats, goal: Floats, cells: int = CELLS) -> 
     return _search(world, ends, cells) if grid is None else _search_map(grid, ends)
 
 
-def map_alone(world: World) -> Grid | None:
+def grid_only(world: World) -> Grid | None:
     """Return the grid of a world that is nothing but a grid, as far as the bounds reach."""
-    if world.grid is None or shapes_of(world):
+    if world.grid is None or obstacle_arrays(world):
         return None
     corners, slack = world.grid.corners, 1e-9 * world.extent
     within = (world.lower - slack <= corners) & (corners <= world.upper + slack)
@@ -159,12 +167,12 @@ def _search_map(grid: Grid, ends: Floats) -> Connection:
 
 
 def _search(world: World, ends: Floats, most: int) -> Connection:
-    obstacles, cells = shapes_of(world.solid()), min(_COARSEST, most)
+    obstacles, cells = obstacle_arrays(world.without_grid()), min(_COARSEST, most)
     while True:
-        lattice = Lattice.over(world.lower, world.upper, cells)
+        lattice = Raster.over(world.lower, world.upper, cells)
         free = ~lattice.blocked(obstacles)
         size = float(lattice.cell.max())
-        nearest = [settled(lattice, free, obstacles, end) for end in ends]
+        nearest = [nearest_free_cell(lattice, free, obstacles, end) for end in ends]
         if nearest[0] is not None and nearest[1] is not None:
             label = components(free)
             if label[nearest[0]] == label[nearest[1]]:
@@ -174,8 +182,8 @@ def _search(world: World, ends: Floats, most: int) -> Connection:
         cells = min(_FINER * cells, most)
 
 
-def settled(
-    lattice: Lattice, free: Bools, obstacles: list[Shapes], point: Floats
+def nearest_free_cell(
+    lattice: Raster, free: Bools, obstacles: list[ObstacleArray], point: Floats
 ) -> tuple[int, ...] | None:
     """Return a free cell that a straight motion from a point leads to, or None."""
     here = lattice.index(point)
@@ -192,7 +200,7 @@ def settled(
     return None
 
 
-def _free_motion(obstacles: list[Shapes], a: Floats, b: Floats) -> bool:
+def _free_motion(obstacles: list[ObstacleArray], a: Floats, b: Floats) -> bool:
     """Whether a straight motion is proven to be free: a free box holds each part of it."""
     parts = [(a, b)]
     for _ in range(_PARTS):
@@ -209,8 +217,8 @@ __all__ = [
     "CELLS",
     "Connection",
     "connected",
-    "covered",
     "free_fraction",
-    "map_alone",
-    "settled",
+    "grid_only",
+    "nearest_free_cell",
+    "occupied",
 ]

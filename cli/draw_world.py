@@ -26,7 +26,7 @@ _BLOCKS, _LETTERS = " ░▒▓█", " .:*#"
 _FRAMES = {True: tuple("┌─┐│└┘"), False: tuple("+-+|++")}
 
 
-def sketch(world: "World", columns: int, rows: int, *, blocks: bool) -> Text:
+def draw_world(world: "World", columns: int, rows: int, *, blocks: bool) -> Text:
     """Draw a world: in 2D as it is, in 3D from above and from the side.
 
     Darker characters have more of an obstacle in them, in 3D along the whole line of sight.
@@ -95,7 +95,7 @@ def _panel(
 
 def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "Floats":
     """Measure which share of each pixel is covered, rows from below; shape (height, width)."""
-    from brrt.worlds.survey import covered  # noqa: PLC0415 - keep --help fast
+    from brrt.worlds.free_space import occupied  # noqa: PLC0415 - keep --help fast
 
     counts = dict(zip(axes, (width * _SAMPLES, height * _SAMPLES), strict=True))
     if world.dim == 3:
@@ -106,7 +106,7 @@ def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "
         for low, high, n in zip(world.lower, world.upper, each, strict=True)
     ]
     grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1)
-    hit = covered(world, grid.reshape(-1, world.dim)).reshape(each).astype(np.float64)
+    hit = occupied(world, grid.reshape(-1, world.dim)).reshape(each).astype(np.float64)
     flat = np.moveaxis(hit, axes, (0, 1)).reshape(each[axes[0]], each[axes[1]], -1).mean(axis=2)
     share = flat.reshape(width, -1, height, flat.shape[1] // height).mean(axis=(1, 3)).T
     thin = _FAINT * _thin(world, width, height) if world.dim == 2 else 0.0
@@ -116,8 +116,8 @@ def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "
 def _thin(world: "World", width: int, height: int) -> "NDArray[np.bool_]":
     """Find the pixels that something thinner than the distance of the points touches."""
     from brrt.worlds import World  # noqa: PLC0415
-    from brrt.worlds.raster import Lattice  # noqa: PLC0415
-    from brrt.worlds.shapes import shapes_of  # noqa: PLC0415
+    from brrt.worlds.obstacle_arrays import obstacle_arrays  # noqa: PLC0415
+    from brrt.worlds.rasterize import Raster  # noqa: PLC0415
 
     cell = (world.upper - world.lower) / (width, height)
     least = float(cell.min()) / _SAMPLES
@@ -130,5 +130,5 @@ def _thin(world: "World", width: int, height: int) -> "NDArray[np.bool_]":
         world.boxes[sides.min(axis=1) < least],
         polygons=tuple(polygon for polygon in world.polygons if len(polygon) == 2),
     )
-    lattice = Lattice(world.lower, cell, (width, height))
-    return lattice.blocked(shapes_of(thin)).T
+    lattice = Raster(world.lower, cell, (width, height))
+    return lattice.blocked(obstacle_arrays(thin)).T

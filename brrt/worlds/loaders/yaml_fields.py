@@ -13,7 +13,7 @@ from brrt.worlds.loaders.loader import finite
 _PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "bool", "null", "seq")}
 
 
-class Fields(NamedTuple):
+class YamlFields(NamedTuple):
     """The fields of a yaml file as nodes, which know their lines.
 
     Nodes are not constructed: tags call nothing, and aliases and merges expand to nothing.

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.worlds import World, make_world
+from brrt.worlds.free_space import connected, free_fraction, occupied
+from brrt.worlds.obstacle_arrays import obstacle_arrays
 from brrt.worlds.occupancy import Grid
-from brrt.worlds.raster import Lattice, components
-from brrt.worlds.shapes import shapes_of
-from brrt.worlds.survey import connected, covered, free_fraction
+from brrt.worlds.rasterize import Raster, components
 from tests.support import naive
 
 Floats = NDArray[np.float64]
@@ -109,7 +109,7 @@ def test_points_are_covered_as_arithmetic_has_it(
     """Every kind of obstacle, on its edge too; points outside the bounds as well."""
     world = some_world(seed, dim, exactly=exactly)
     points = halves(np.random.default_rng(seed + 1), -2, 12, (count, dim))
-    assert covered(world, points).tolist() == [touches(world, point) for point in points]
+    assert occupied(world, points).tolist() == [touches(world, point) for point in points]
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_many_obstacles_cover_what_each_of_them_covers(spec: str) -> None:
     points = np.random.default_rng(5).uniform(world.lower, world.upper, (1000, world.dim))
     expected = [world.obstacle_at(point) is not None for point in points]
     assert 0.05 < np.mean(expected) < 0.95
-    assert covered(world, points).tolist() == expected
+    assert occupied(world, points).tolist() == expected
 
 
 @DIMS
@@ -141,8 +141,8 @@ def test_points_are_covered_at_every_scale(dim: int, scale: float) -> None:
         "grown", world.lower * scale, world.upper * scale, world.balls * scale,
         world.boxes * scale, polygons=tuple(polygon * scale for polygon in world.polygons),
     )  # fmt: skip
-    assert (covered(grown, points * scale) == covered(world, points)).all()
-    assert covered(world, points).any()
+    assert (occupied(grown, points * scale) == occupied(world, points)).all()
+    assert occupied(world, points).any()
 
 
 # Share
@@ -189,7 +189,7 @@ def test_the_share_depends_on_the_seed_alone() -> None:
 def test_a_lattice_fills_its_box(size: list[float], cells: int) -> None:
     """About as many cells as asked for, and nearly cubes unless one is wider than the box."""
     upper = np.array(size)
-    lattice = Lattice.over(np.zeros(len(size)), upper, cells)
+    lattice = Raster.over(np.zeros(len(size)), upper, cells)
     shape = np.array(lattice.shape)
     assert np.allclose(lattice.cell * shape, upper)
     assert shape.prod() <= 3 * cells
@@ -204,8 +204,8 @@ def test_a_lattice_fills_its_box(size: list[float], cells: int) -> None:
 def test_blocked_cells_are_the_touched_ones(dim: int, seed: int, exactly: bool, cells: int) -> None:
     """A cell that an obstacle touches is blocked, and no other, but for rounding."""
     world = some_world(seed, dim, most=3, exactly=exactly)
-    lattice = Lattice.over(world.lower, world.upper, cells)
-    blocked = lattice.blocked(shapes_of(world))
+    lattice = Raster.over(world.lower, world.upper, cells)
+    blocked = lattice.blocked(obstacle_arrays(world))
     assert blocked.shape == lattice.shape
     for index in np.ndindex(lattice.shape):
         low, high = lattice.corners(np.array(index))
@@ -295,7 +295,7 @@ def test_a_way_that_is_found_stays_among_free_points(dim: int, seed: int) -> Non
     steps = (61, 61) if dim == 2 else (25, 25, 25)
     axes = [np.linspace(0, 10, n) for n in steps]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    free = ~covered(world, points.reshape(-1, dim)).reshape(steps)
+    free = ~occupied(world, points.reshape(-1, dim)).reshape(steps)
     if free.sum() < 2:
         return
     cells = np.argwhere(free)
@@ -310,7 +310,7 @@ def _finer(world: World, start: Floats, goal: Floats) -> bool:
     steps = (1201, 1201) if world.dim == 2 else (121,) * 3
     axes = [np.linspace(0, 10, n) for n in steps]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, world.dim)
-    label = components(~covered(world, points).reshape(steps))
+    label = components(~occupied(world, points).reshape(steps))
     ends = [np.round(end / 10 * (np.array(steps) - 1)).astype(int) for end in (start, goal)]
     return bool(label[tuple(ends[0])] == label[tuple(ends[1])] >= 0)
 
@@ -331,7 +331,7 @@ def test_a_map_is_decided_on_its_own_cells(seed: int, rows: int, columns: int, y
     assert free_fraction(replace(world, boxes=np.full((1, 4), 99.0)))[0] == pytest.approx(
         free_fraction(world)[0], abs=0.01
     )
-    solid = connected(world.solid(), places[0], places[1], cells=1 << 14)
+    solid = connected(world.without_grid(), places[0], places[1], cells=1 << 14)
     assert solid.connected is not (not found.connected)
 
 

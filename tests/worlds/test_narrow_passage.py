@@ -11,10 +11,10 @@ from hypothesis.extra.numpy import arrays
 
 from brrt import BrrtError, Grid, World, make_world
 from brrt.worlds.convex import convex_polygon, inscribed
-from brrt.worlds.passage import clearance, narrowest, widest
-from brrt.worlds.raster import Lattice
-from brrt.worlds.shapes import shapes_of
-from brrt.worlds.survey import covered
+from brrt.worlds.free_space import occupied
+from brrt.worlds.narrow_passage import clearance, narrowest, widest
+from brrt.worlds.obstacle_arrays import obstacle_arrays
+from brrt.worlds.rasterize import Raster
 
 SHAPES = st.sampled_from([(5, 7), (9, 4), (3, 4, 5)])
 FREE = SHAPES.flatmap(lambda shape: arrays(np.bool_, shape))
@@ -145,15 +145,16 @@ def test_what_is_filled_is_not_free(seed: int) -> None:
     """Any point of a cell that an obstacle fills touches one; whole boxes are found filled."""
     rng = np.random.default_rng(seed)
     world = make_world(f"polygons2d:n=6,size=20,seed={seed % 100}")
-    lattice = Lattice.over(world.lower, world.upper, 900)
-    cells = np.argwhere(lattice.filled(shapes_of(world)))
-    assert not lattice.filled(shapes_of(world))[~lattice.blocked(shapes_of(world))].any()
+    lattice = Raster.over(world.lower, world.upper, 900)
+    filled = lattice.filled(obstacle_arrays(world))
+    cells = np.argwhere(filled)
+    assert not filled[~lattice.blocked(obstacle_arrays(world))].any()
     points = lattice.lower + (cells + rng.random(cells.shape)) * lattice.cell
-    assert not len(points) or covered(world, points).all()
+    assert not len(points) or occupied(world, points).all()
     box = World(
         "box", np.zeros(3), np.full(3, 8.0), boxes=np.array([[1.5, 1.5, 1.5, 5.5, 4.5, 4.5]])
     )
-    assert Lattice.over(box.lower, box.upper, 512).filled(shapes_of(box)).sum() == 3 * 2 * 2
+    assert Raster.over(box.lower, box.upper, 512).filled(obstacle_arrays(box)).sum() == 3 * 2 * 2
 
 
 @settings(max_examples=40)

@@ -1,0 +1,59 @@
+"""Array types, and numbers from files and users read into arrays."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.errors import BrrtError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+GREATEST = 1e100
+"""Largest absolute value of a coordinate: kernels square coordinates, which must not overflow."""
+
+
+def read_numbers(name: str, values: Any, what: str, shape: tuple[int | None, ...]) -> Floats:
+    """Convert numbers from JSON or Python to an array.
+
+    Args:
+        name: What the values are, for messages ("world: balls").
+        values: The values.
+        what: What they should be, for messages ("rows of 3 numbers").
+        shape: The shape they must have; None for any length.
+
+    Returns:
+        A new array. An empty list counts as no rows.
+
+    Raises:
+        BrrtError: The values are no such numbers, not finite, or beyond `GREATEST`.
+    """
+    try:
+        array = np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise BrrtError(f"{name} must be {what}{_wrong_row(values, shape[-1:])}") from None
+    if array.size == 0 and len(shape) > 1 and shape[0] is None:
+        return np.empty([n or 0 for n in shape])
+    fits = array.ndim == len(shape) and all(
+        wanted in (None, n) for n, wanted in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        raise BrrtError(f"{name} must be {what}")
+    if not (np.abs(array) <= GREATEST).all():
+        kind = "finite numbers" if shape else "a finite number"
+        raise BrrtError(f"{name} must be {kind} up to {GREATEST:g}")
+    return array
+
+
+def _wrong_row(values: Any, width: tuple[int | None, ...]) -> str:
+    """Name the first row of a list that is not as many numbers as it should be."""
+    if not isinstance(values, list) or not values or not isinstance(values[0], list):
+        return ""
+    wanted = width[0] or len(values[0])
+    for i, row in enumerate(values):
+        numbers = isinstance(row, list) and all(isinstance(x, int | float) for x in row)
+        if not numbers or len(row) != wanted:
+            return f"; row {i} is not"
+    return ""
