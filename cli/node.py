@@ -1,4 +1,4 @@
-"""`brrt replay --node`: what became of a node of a tree, or of a cell of a lattice."""
+"""`brrt replay --node`: the history of a node of a tree, or of a cell of a lattice."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -7,11 +7,11 @@ from .console import print_json, print_pairs, seconds
 
 if TYPE_CHECKING:
     from brrt.replay.cell_history import CellHistory
-    from brrt.replay.history_records import NodeHistory, When
+    from brrt.replay.node_history import NodeHistory, When
     from brrt.replay.snapshot import Snapshot
 
 _SHOWN = 5
-"""Events of a kind that are listed; of more, the first and the last."""
+"""Events of a kind that are listed: the first ones, and the last."""
 
 _TREES = {"start": 0, "goal": 1}
 
@@ -19,17 +19,17 @@ Rows = Iterator[tuple[str, str]]
 
 
 def tree_number(tree: str | None) -> int:
-    """Read the number of a tree, or what it grows from.
+    """Return the number of a tree, given as a number or by what it grows from.
 
     Raises:
-        BrrtError: It is neither.
+        BrrtError: The text is neither.
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
 
     if tree is None:
         return 0
     if tree not in _TREES and not (tree.isdecimal() and int(tree) < 256):
-        raise BrrtError(f"--tree must be start, goal or a number like 0 and 1, not {tree!r}")
+        raise BrrtError(f"--tree must be start, goal or the number of a tree, not {tree!r}")
     return _TREES[tree] if tree in _TREES else int(tree)
 
 
@@ -37,9 +37,9 @@ def show_node(moment: "Snapshot", node: int, tree: int, *, as_json: bool) -> Non
     """Print a node's history up to an instant, or a cell's.
 
     Raises:
-        BrrtError: There was no such node.
+        BrrtError: The node does not exist.
     """
-    from brrt.replay.history_records import NodeHistory  # noqa: PLC0415
+    from brrt.replay.node_history import NodeHistory  # noqa: PLC0415
 
     found = moment.node(node, tree)
     if as_json:
@@ -52,9 +52,9 @@ def show_node(moment: "Snapshot", node: int, tree: int, *, as_json: bool) -> Non
 def _of_node(h: "NodeHistory") -> Rows:
     from brrt.replay.node_history import tree_name  # noqa: PLC0415
 
-    yield "node", f"{h.node:,} of tree {h.tree} ({tree_name(h.tree)}) at {_place(h.q)}"
+    yield "node", f"{h.node:,} of {tree_name(h.tree)} at {_place(h.q)}"
     parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"
-    yield "born", f"{_when(h.born)}; {parent}, cost {h.born_cost:.6g}"
+    yield "added", f"{_when(h.born)}; {parent}, cost {h.born_cost:.6g}"
     if h.sample is not None:
         other = "" if h.sample.tree == h.tree else f" for tree {h.sample.tree}"
         drawn = f"{h.sample.source}{other}, {_place(h.sample.q)}"
@@ -62,46 +62,46 @@ def _of_node(h: "NodeHistory") -> Rows:
     yield from _listed(
         "rewired",
         [
-            f"{_when(turn.when)}; parent {turn.old_parent:,} -> {turn.parent:,}, "
-            f"cost {turn.before:.6g} -> {turn.after:.6g}"
-            for turn in h.rewires
+            f"{_when(change.when)}; parent {change.old_parent:,} -> {change.parent:,}, "
+            f"cost {change.before:.6g} -> {change.after:.6g}"
+            for change in h.rewires
         ],
     )
     yield from _listed(
-        "followed",
+        "ancestors",
         [
-            f"{_when(turn.when)}; ancestor {turn.node:,} rewired, "
-            f"cost {turn.before:.6g} -> {turn.after:.6g}"
-            for turn in h.follows
+            f"{_when(change.when)}; ancestor {change.node:,} rewired, "
+            f"cost {change.before:.6g} -> {change.after:.6g}"
+            for change in h.follows
         ],
     )
     if h.rewires or h.follows:
         yield "now", f"child of {h.parent:,}, cost {h.cost:.6g}"
     yield (
-        "below",
+        "subtree",
         f"{_count(len(h.children), 'child', 'children')}{_some(h.children)}, "
         + _count(h.descendants, "descendant"),
     )
-    yield "way", _way(h.lineage)
+    yield "from root", _lineage(h.lineage)
     on = [f"waypoint {i} of the {stage} path" for stage, i in h.paths.items()]
-    yield "path", ", ".join(on) or "on no path that stands"
+    yield "path", ", ".join(on) or "not on a path"
     yield from _rejects(h)
 
 
 def _rejects(h: "NodeHistory") -> Rows:
     if not h.rejects:
-        yield "rejected", "no extension from it"
+        yield "rejected", "no extensions from this node"
         return
     extensions = _count(len(h.rejects), "extension")
-    yield "rejected", f"{extensions} from it: {_counts(h.reasons())}"
+    yield "rejected", f"{extensions} from this node: {_counts(h.reasons())}"
     if h.hits():
-        yield "", f"in the way: {_counts(h.hits())}"
-    told = [
+        yield "", f"obstacles: {_counts(h.hits())}"
+    lines = [
         f"{_when(each.when)}; {each.reason} towards {_place(each.q)}"
         + (f", {each.hit}" if each.hit else "")
         for each in h.rejects
     ]
-    yield from _listed("", told)
+    yield from _listed("", lines)
 
 
 def _of_cell(h: "CellHistory") -> Rows:
@@ -112,7 +112,7 @@ def _of_cell(h: "CellHistory") -> Rows:
         "",
         [
             f"{_when(look.when)}; "
-            + ("where the search began" if look.parent < 0 else f"from cell {look.parent:,}")
+            + ("first cell of the search" if look.parent < 0 else f"from cell {look.parent:,}")
             + f", cost {look.cost:.6g}"
             for look in h.looks
         ],
@@ -128,7 +128,7 @@ def _of_cell(h: "CellHistory") -> Rows:
     yield "entered", _count(len(h.visits), "time")
     yield from _listed("", [_when(visit) for visit in h.visits])
     if h.rejects:
-        yield "rejected", f"motions from it: {_counts(h.rejects)}"
+        yield "rejected", f"motions from this cell: {_counts(h.rejects)}"
 
 
 def _listed(name: str, lines: list[str]) -> Rows:
@@ -138,7 +138,7 @@ def _listed(name: str, lines: list[str]) -> Rows:
         yield ("" if i else name), line
     if len(shown) < len(lines):
         left = len(lines) - len(shown)
-        yield "", f"... {left:,} more, the last of these: {lines[-1]}"
+        yield "", f"... {left:,} more, the last: {lines[-1]}"
 
 
 def _when(when: "When") -> str:
@@ -161,14 +161,14 @@ def _some(numbers: list[int]) -> str:
 
 
 def _counts(found: Mapping[str, Any]) -> str:
-    """Say how many there are of each, the most frequent first; of many, those alone."""
-    told = [f"{name} {n:,}" for name, n in list(found.items())[:_SHOWN]]
-    rest = len(found) - len(told)
-    return ", ".join(told) + (f" and {rest:,} others" if rest else "")
+    """Write how many there are of each, the most frequent first; of many, only those."""
+    parts = [f"{name} {n:,}" for name, n in list(found.items())[:_SHOWN]]
+    rest = len(found) - len(parts)
+    return ", ".join(parts) + (f" and {rest:,} others" if rest else "")
 
 
-def _way(lineage: list[int]) -> str:
-    """Write the nodes from the root on; of a long way its ends."""
+def _lineage(lineage: list[int]) -> str:
+    """Write the nodes from the root on; of many, the first and the last."""
     ends = lineage if len(lineage) <= 2 * _SHOWN else lineage[:_SHOWN] + lineage[-_SHOWN:]
     texts = [f"{node:,}" for node in ends]
     if len(ends) < len(lineage):

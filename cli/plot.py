@@ -165,7 +165,7 @@ def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "lis
     """Read the runs, up to the instant asked for; those of one name are told apart by folder."""
     from brrt.events import Events  # noqa: PLC0415
     from brrt.recording import Memory  # noqa: PLC0415
-    from brrt.replay.snapshot import feed  # noqa: PLC0415
+    from brrt.replay.fold import feed  # noqa: PLC0415
     from brrt.views.matplotlib.history import Record  # noqa: PLC0415
 
     names = Counter(run.stem for run in runs)

@@ -81,8 +81,8 @@ def replay(
     """
     from brrt.comparison.difference import event_lines  # noqa: PLC0415
     from brrt.comparison.events import RecentEvents  # noqa: PLC0415
+    from brrt.replay.fold import feed  # noqa: PLC0415
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
-    from brrt.replay.snapshot import feed  # noqa: PLC0415
     from brrt.replay.transcript import Transcript  # noqa: PLC0415
     from brrt.replay.tree_stats import TreeStats  # noqa: PLC0415
 
@@ -152,7 +152,7 @@ def _note_end(limits: dict[str, int], count: int, last: "Instant") -> None:
 
 
 def _draw(recording: "Recording", rrd: Path, limits: dict[str, int], *, partial: bool) -> None:
-    from brrt.replay.snapshot import feed  # noqa: PLC0415
+    from brrt.replay.fold import feed  # noqa: PLC0415
     from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
 
     sink = RerunSink(recording.manifest, recording.world, path=rrd)

@@ -101,7 +101,7 @@ class _Log:
 
     def cut(self) -> Cut | None:
         """Return where the recording ends, if that is before its run's end."""
-        unfinished = self._recording.result is None and self._metrics.breaks_off
+        unfinished = self._recording.result is None and self._metrics.cut
         if not (self._damaged or unfinished):
             return None
         return Cut(sum(self._metrics.counts.values()), self._last_t / 1e9)

@@ -1,6 +1,6 @@
 """All that an explanation knows: figures, each computed from the recording."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from brrt.explanation.clearance import Narrow, Way, Ways
 from brrt.explanation.gather import FAILED, Gather
 from brrt.explanation.places import Blocker, Coverage, Gap, Places, Spot
 from brrt.planners import PLANNERS
-from brrt.replay.history_records import as_plain
 from brrt.replay.snapshot import Snapshot
 from brrt.replay.transcript import choice_name
 from brrt.robots import Robot
@@ -180,7 +179,7 @@ class Facts:
 
     def as_dict(self) -> dict[str, Any]:
         """Return all but the manifest as plain numbers, texts, lists and dicts."""
-        plain: dict[str, Any] = as_plain(self)
+        plain = asdict(self)
         for name in ("manifest", "file", "ended"):
             del plain[name]
         way = plain.pop("way")

@@ -1,21 +1,21 @@
-"""What became of one cell of a lattice: how often it was looked at, what was learnt of it."""
+"""The history of one cell of a lattice: its expansions, its estimate, the moves into it."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Table
-from brrt.replay.history_records import When, as_plain
+from brrt.replay.node_history import When
 from brrt.replay.transcript import choice_name
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Expansion:
     """A search expanded the cell.
 
     Attributes:
@@ -30,7 +30,7 @@ class Look:
 
 
 @dataclass(frozen=True, slots=True)
-class Lesson:
+class EstimateChange:
     """The estimate of the cell's cost-to-go was raised.
 
     Attributes:
@@ -46,38 +46,38 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True)
 class CellHistory:
-    """All that a log says about a cell up to an instant.
+    """A cell up to an instant.
 
     Attributes:
         cell: Its number.
-        q: Where it is.
-        distance: How far it is from the goal, which is its first estimate.
-        looks: Each time it was expanded.
-        lessons: Each time its estimate was raised.
-        visits: Each time the robot moved into it.
-        rejects: How many motions from it failed, by reason.
+        q: Its configuration.
+        distance: Its distance to the goal, which is its first estimate.
+        looks: Its expansions.
+        lessons: The changes of its estimate.
+        visits: The moves into it.
+        rejects: Number of rejected motions from it, by reason.
     """
 
     cell: int
     q: list[float]
     distance: float
-    looks: list[Look]
-    lessons: list[Lesson]
+    looks: list[Expansion]
+    lessons: list[EstimateChange]
     visits: list[When]
     rejects: dict[str, int]
 
     @property
     def estimate(self) -> float:
-        """What the cost-to-go is thought to be at the instant."""
+        """The estimate of the cost-to-go at the instant."""
         return self.lessons[-1].after if self.lessons else self.distance
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain numbers, texts, lists and dicts."""
-        return {**as_plain(self), "estimate": self.estimate}
+        """Return plain numbers, texts, lists and dicts."""
+        return {**asdict(self), "estimate": self.estimate}
 
 
 class CellTrace:
-    """A fold that keeps what a cell's history is told from.
+    """A fold that keeps the events that concern a cell.
 
     Args:
         cell: The cell's number.
@@ -93,7 +93,7 @@ class CellTrace:
         self._seen = -1
 
     def write(self, events: Events) -> None:
-        """Take in a batch."""
+        """Take a batch."""
         for kind, parts in self._kept.items():
             table = events[kind]
             parts.append(table[table["cell"] == self._cell])
@@ -104,21 +104,24 @@ class CellTrace:
 
     @property
     def has_cells(self) -> bool:
-        """Whether there are cells in the log."""
+        """Whether the log has cells."""
         return self._seen >= 0
 
     def history(self, robot: Robot) -> CellHistory:
-        """Tell the history.
+        """Return the history.
+
+        Args:
+            robot: The robot, resolved in the world.
 
         Raises:
-            BrrtError: The cell was never expanded.
+            BrrtError: The cell was neither expanded nor entered.
         """
         looks, raised, moves = (np.concatenate(self._kept[kind]) for kind in self._kept)
         known = looks if len(looks) else raised if len(raised) else moves
         if self._cell < 0 or not len(known):
             raise BrrtError(
-                f"cell {self._cell} was neither expanded nor entered by then; "
-                f"those that were are numbered from 0 to {self._seen:,}"
+                f"cell {self._cell} was neither expanded nor entered up to this instant; the cells "
+                f"that were have the numbers 0 to {self._seen:,}"
             )
         far = float(robot.distance(known["q"][0], self._goal))
         before = [far, *raised["h"][:-1].tolist()]
@@ -126,9 +129,11 @@ class CellTrace:
             cell=self._cell,
             q=known["q"][0].tolist(),
             distance=far,
-            looks=[Look(When.of(row), int(row["parent"]), float(row["cost"])) for row in looks],
+            looks=[
+                Expansion(When.of(row), int(row["parent"]), float(row["cost"])) for row in looks
+            ],
             lessons=[
-                Lesson(When.of(row), old, float(row["h"]))
+                EstimateChange(When.of(row), old, float(row["h"]))
                 for row, old in zip(raised, before, strict=False)
             ],
             visits=[When.of(row) for row in moves],

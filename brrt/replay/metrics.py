@@ -1,4 +1,4 @@
-"""The figures of a run: one fold over its events, live or from a file."""
+"""The metrics of a run: one fold over its events, live or from a file."""
 
 import math
 from collections.abc import Mapping
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
+from brrt.replay.fold import feed
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
 
@@ -27,10 +28,10 @@ def _phase(event: Any) -> tuple[Phase, Status]:
 
 
 class Metrics:
-    """A sink that counts; its memory does not grow with the run.
+    """A fold of constant memory.
 
     Args:
-        manifest: The run's.
+        manifest: The run's manifest.
     """
 
     def __init__(self, manifest: Manifest) -> None:
@@ -47,10 +48,10 @@ class Metrics:
         self._ended: dict[Phase, tuple[int, Status]] = {}
 
     def write(self, events: Events) -> None:
-        """Take in a batch.
+        """Take a batch.
 
         Raises:
-            BrrtError: There is no such phase, or no such status.
+            BrrtError: A phase or a status is unknown.
         """
         for kind, count in events.counts.items():
             self._events += count
@@ -73,55 +74,55 @@ class Metrics:
         if event["stage"] == Stage.SMOOTHED:
             self._smoothed = path
             return
-        # A better path takes the place of the one before it.
+        # A better path replaces the one before.
         self._raw = path
         if self._first is None:
             self._first = Instant(int(event["t"]), int(event["iteration"])), path[0]
 
     @property
     def solved(self) -> bool:
-        """Whether there is a path."""
+        """Whether a path was found."""
         return self._raw is not None
 
     @property
     def best_path(self) -> Path | None:
-        """The path that stands: the smoothed one, or else the last that the planner found."""
+        """The smoothed path, or else the last that the planner found."""
         return self._smoothed or self._raw
 
     @property
     def counts(self) -> Mapping[Kind, int]:
-        """Events of each kind, of those that do not occur as well."""
+        """Number of events of each kind, 0 included."""
         return self._counts
 
     @property
     def iterations(self) -> int:
-        """The planner's count at the last event."""
+        """The last event's iteration."""
         return self._iterations
 
     @property
     def status(self) -> str:
-        """How planning ended, or "running" where the log ends before."""
+        """How planning ended; "running" if the log ends before."""
         ended = self._ended.get(Phase.PLAN)
         return "running" if ended is None else ended[1].name.lower().replace("_", " ")
 
     @property
-    def breaks_off(self) -> bool:
-        """Whether the log ends within a phase, or ahead of the first."""
+    def cut(self) -> bool:
+        """Whether the log ends within a phase, or before the first."""
         return not self._began or not self._began.keys() <= self._ended.keys()
 
     def _seconds(self, phase: Phase) -> float | None:
-        """How long a phase took, up to the last event if it did not end; None if it never began."""
+        """Return a phase's duration, up to the last event if it did not end; None without one."""
         if phase not in self._began:
             return None
         end = self._ended.get(phase, (self._last_t, Status.BEGIN))[0]
         return (end - self._began[phase]) / 1e9
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures under the names that `--json` prints; None where there is none.
+        """Return the metrics under the names that `--json` prints; None for one without a value.
 
         `nodes` and `edges` count the events of kind edge, roots included. `path` is the last that
-        the planner found. Where a robot moved, `moves` counts the last trial's moves; elsewhere
-        the motions of the final path (waypoints - 1).
+        the planner found. `moves` counts the last trial's moves if the robot moved, otherwise the
+        motions of the final path (waypoints - 1).
         """
         scenario = self._manifest.scenario
         raw, smoothed = self._raw, self._smoothed
@@ -156,7 +157,7 @@ class Metrics:
         }
 
     def _first_path(self) -> dict[str, Any]:
-        """When the first path was found, and what it cost."""
+        """Return when the first path was found, and its cost."""
         if self._first is None:
             return dict.fromkeys(("first_path_s", "first_path_iteration", "first_path_cost"))
         (t, iteration), cost = self._first
@@ -168,13 +169,9 @@ class Metrics:
 
 
 class _Moves:
-    """The figures of a robot that moves, one move in every deadline.
+    """The metrics of a robot that moves, one move in every deadline.
 
-    A move's planning time is the time since the move before it; the first one's, since planning
-    began.
-
-    Args:
-        scenario: Says the deadline.
+    A move's planning time is the time since the move before; the first one's, since planning began.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -184,7 +181,7 @@ class _Moves:
         self._longest = self._misses = self._charged = self._stays = 0
 
     def write(self, moves: Table, began: int) -> None:
-        """Take in a batch; `began` is when planning began, in ns."""
+        """Take a batch; `began` is when planning began, in ns."""
         if not len(moves):
             return
         before = began if self._last_t is None else self._last_t
@@ -200,7 +197,7 @@ class _Moves:
         self._count += int((moves["trial"] == trial).sum())
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures; without moves the robot's are None."""
+        """Return the metrics; None for each without moves."""
         if self._last_t is None:
             names = ("max_move_time_s", "deadline_misses", "charged_moves", "stays")
             return dict.fromkeys(names)
@@ -214,13 +211,12 @@ class _Moves:
 
 
 def _finite(value: float | None) -> float | None:
-    """Keep JSON valid: it has no infinity."""
+    """Return None for infinity and nan, which JSON does not have."""
     return value if value is not None and math.isfinite(value) else None
 
 
 def metrics(recording: Recording) -> Metrics:
     """Fold the events of a run into its metrics."""
     found = Metrics(recording.manifest)
-    for batch in recording.batches():
-        found.write(batch)
+    feed(recording.batches(), [found])
     return found

@@ -1,6 +1,8 @@
-"""What became of one node of a tree: a fold over the events that concern it."""
+"""The history of one node of a tree: a fold over the events that concern it."""
 
-from typing import Any
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +10,6 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Source, Stage, Table
 from brrt.replay.forest import Tree, forest
-from brrt.replay.history_records import Draw, NodeHistory, Rejected, Turn, When
 from brrt.replay.ledger import Changes, Questions, changes, edge_lengths, fold
 from brrt.replay.transcript import choice_name
 from brrt.robots import Robot
@@ -17,18 +18,139 @@ from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 
-NAMES = {0: "start", 1: "goal"}
-"""What each tree grows from."""
+_NAMES = {0: "start", 1: "goal"}
 
 _BLOCKED = (Reason.COLLISION, Reason.GOAL_BLOCKED, Reason.LINK_BLOCKED, Reason.NEAR_BLOCKED)
 
 
+@dataclass(frozen=True, slots=True)
+class When:
+    """When an event happened: its number, its time in seconds, and its iteration."""
+
+    event: int
+    time_s: float
+    iteration: int
+
+    @classmethod
+    def of(cls, row: Any) -> Self:
+        """Return when the event in a row of a table happened."""
+        return cls(int(row["seq"]), int(row["t"]) / 1e9, int(row["iteration"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """The last sample before a node was added, in the same iteration.
+
+    Attributes:
+        when: Its event.
+        tree: The tree that was to grow towards it.
+        source: Where it came from.
+        q: Configuration.
+    """
+
+    when: When
+    tree: int
+    source: str
+    q: list[float]
+
+
+@dataclass(frozen=True, slots=True)
+class CostChange:
+    """A rewire that changed a node's cost.
+
+    Attributes:
+        when: The rewire's event.
+        node: The rewired node: the node itself or an ancestor.
+        old_parent: The rewired node's parent before.
+        parent: Its parent afterwards.
+        before: Cost-to-come, before, of the node whose history this is.
+        after: Its cost-to-come afterwards.
+    """
+
+    when: When
+    node: int
+    old_parent: int
+    parent: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """A rejected extension from the node.
+
+    Attributes:
+        when: Its event.
+        reason: Why it was rejected.
+        q: The configuration that it was to reach.
+        hit: The obstacle in its way, by verify's geometry; None if there is none.
+    """
+
+    when: When
+    reason: str
+    q: list[float]
+    hit: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class NodeHistory:
+    """A node up to an instant.
+
+    Attributes:
+        node: Its number.
+        tree: Number of its tree.
+        q: Its configuration.
+        born: The event that added it.
+        born_parent: Its first parent; -1 for a root.
+        born_cost: Its first cost-to-come.
+        sample: The sample before it was added; None for roots.
+        rewires: Each time it was rewired.
+        follows: Each time its cost changed because an ancestor was rewired.
+        parent: Its parent at the instant.
+        cost: Its cost-to-come at the instant.
+        lineage: Nodes from the root to it.
+        children: Its children.
+        descendants: Number of nodes below it.
+        paths: For each current path through it, by stage, the number of its waypoint.
+        rejects: The rejected extensions from it.
+    """
+
+    node: int
+    tree: int
+    q: list[float]
+    born: When
+    born_parent: int
+    born_cost: float
+    sample: Draw | None
+    rewires: list[CostChange]
+    follows: list[CostChange]
+    parent: int
+    cost: float
+    lineage: list[int]
+    children: list[int]
+    descendants: int
+    paths: dict[str, int]
+    rejects: list[Rejection]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, texts, lists and dicts."""
+        return asdict(self)
+
+    def reasons(self) -> dict[str, int]:
+        """Count the rejected extensions by reason, most frequent first."""
+        return dict(Counter(each.reason for each in self.rejects).most_common())
+
+    def hits(self) -> dict[str, int]:
+        """Count the rejected extensions by obstacle, most frequent first."""
+        return dict(Counter(each.hit for each in self.rejects if each.hit).most_common())
+
+
 class NodeTrace:
-    """A fold that keeps what a node's history is told from.
+    """A fold that keeps the events that concern a node.
 
     Args:
         node: The node's number.
-        tree: Its tree's.
+        tree: Number of its tree.
         dof: Numbers in a configuration.
     """
 
@@ -42,7 +164,7 @@ class NodeTrace:
         self._trees: set[int] = set()
 
     def write(self, events: Events) -> None:
-        """Take in a batch."""
+        """Take a batch."""
         self._trees.update(np.unique(events[Kind.EDGE]["tree"]).tolist())
         mine = {
             kind: table[table["tree"] == self._tree]
@@ -54,11 +176,11 @@ class NodeTrace:
         self._structure.append(Events(self._dof, mine))
         samples = events[Kind.SAMPLE]
         edges = mine.get(Kind.EDGE, events[Kind.EDGE][:0])
-        born = edges[edges["node"] == self._node]
-        if len(born):
-            before = samples[samples["seq"] < born["seq"][0]]
+        added = edges[edges["node"] == self._node]
+        if len(added):
+            before = samples[samples["seq"] < added["seq"][0]]
             last = before[-1:] if len(before) else self._drawn
-            if last is not None and last["iteration"][0] == born["iteration"][0]:
+            if last is not None and last["iteration"][0] == added["iteration"][0]:
                 self._sample = last[0]
         self._drawn = samples[-1:].copy() if len(samples) else self._drawn
         for path in events[Kind.PATH]:
@@ -67,56 +189,53 @@ class NodeTrace:
 
     @property
     def has_trees(self) -> bool:
-        """Whether there are trees in the log."""
+        """Whether the log has trees."""
         return bool(self._trees)
 
     def history(self, robot: Robot, world: World) -> NodeHistory:
-        """Tell the history.
+        """Return the history.
 
         Args:
-            robot: What moves, settled in the world.
-            world: Where.
+            robot: The robot, resolved in the world.
+            world: The world.
 
         Raises:
-            BrrtError: There is no such node.
-            RecordingError: The edges make no trees.
+            BrrtError: The node does not exist.
+            RecordingError: The events do not make trees.
         """
         events = Events.concat(self._dof, self._structure)
         trees = forest(events, robot.distance)
         if self._tree not in trees:
-            there = " and ".join(
-                f"tree {number} ({tree_name(number)})" for number in sorted(self._trees)
-            )
-            name = f"tree {self._tree} ({tree_name(self._tree)})"
-            raise BrrtError(f"{name} has no nodes by then; there is {there or 'none'}")
-        tree = trees[self._tree]
-        if not 0 <= self._node < len(tree):
+            others = ", ".join(map(tree_name, sorted(self._trees))) or "none"
             raise BrrtError(
-                f"tree {self._tree} ({tree_name(self._tree)}) has the nodes 0 to "
-                f"{len(tree) - 1:,} by then, and no node {self._node:,}"
+                f"{tree_name(self._tree)} has no nodes at this instant; trees with nodes: {others}"
             )
-        node = self._node
-        birth = events[Kind.EDGE][node]
+        tree, node = trees[self._tree], self._node
+        if not 0 <= node < len(tree):
+            raise BrrtError(
+                f"node {node:,} does not exist at this instant: {tree_name(self._tree)} has the "
+                f"nodes 0 to {len(tree) - 1:,}"
+            )
+        edge = events[Kind.EDGE][node]
         q = tree.q[node]
-        turns = self._turns(events, tree, robot)
-        below = tree.below(node)
+        costs = self._cost_changes(events, tree, robot)
         return NodeHistory(
             node=node,
             tree=self._tree,
             q=q.tolist(),
-            born=When.of(birth),
-            born_parent=int(birth["parent"]),
-            born_cost=float(birth["cost"]),
+            born=When.of(edge),
+            born_parent=int(edge["parent"]),
+            born_cost=float(edge["cost"]),
             sample=self._draw(),
-            rewires=[turn for turn in turns if turn.node == node],
-            follows=[turn for turn in turns if turn.node != node],
+            rewires=[change for change in costs if change.node == node],
+            follows=[change for change in costs if change.node != node],
             parent=int(tree.parent[node]),
             cost=float(tree.cost[node]),
             lineage=tree.lineage(node),
             children=np.flatnonzero(tree.parent == node).tolist(),
-            descendants=len(below),
-            paths=self._places(q),
-            rejects=self._rejected(q, robot, world),
+            descendants=len(tree.below(node)),
+            paths=self._waypoints(q),
+            rejects=self._rejections(q, robot, world),
         )
 
     def _draw(self) -> Draw | None:
@@ -126,8 +245,8 @@ class NodeTrace:
         number = int(row["source"])
         return Draw(When.of(row), int(row["tree"]), choice_name(Source, number), row["q"].tolist())
 
-    def _turns(self, events: Events, tree: Tree, robot: Robot) -> list[Turn]:
-        """Find the rewires that changed the node's cost: its own, and those of its ancestors."""
+    def _cost_changes(self, events: Events, tree: Tree, robot: Robot) -> list[CostChange]:
+        """Return the node's own rewires, and those of ancestors that changed its cost."""
         rewires = events[Kind.REWIRE]
         if not len(rewires):
             return []
@@ -143,11 +262,11 @@ class NodeTrace:
         old = _parents_before(made)[np.searchsorted(made.seq, some["seq"])].tolist()
         both = zip(costs[concerned].tolist(), costs[concerned + 1].tolist(), strict=True)
         return [
-            Turn(When.of(row), int(row["node"]), parent, int(row["parent"]), before, after)
+            CostChange(When.of(row), int(row["node"]), parent, int(row["parent"]), before, after)
             for row, parent, (before, after) in zip(some, old, both, strict=True)
         ]
 
-    def _places(self, q: Floats) -> dict[str, int]:
+    def _waypoints(self, q: Floats) -> dict[str, int]:
         found = {}
         for stage, path in self._paths.items():
             at = np.flatnonzero((path == q).all(axis=1))
@@ -155,7 +274,7 @@ class NodeTrace:
                 found[stage] = int(at[0])
         return found
 
-    def _rejected(self, q: Floats, robot: Robot, world: World) -> list[Rejected]:
+    def _rejections(self, q: Floats, robot: Robot, world: World) -> list[Rejection]:
         rows = np.concatenate(self._rejects)
         blocked = np.flatnonzero(np.isin(rows["reason"], [int(reason) for reason in _BLOCKED]))
         names: dict[int, str] = {}
@@ -166,7 +285,7 @@ class NodeTrace:
             found = zip(blocked.tolist(), hits.tolist(), strict=True)
             names = {i: obstacles.name(hit) for i, hit in found if hit >= 0}
         return [
-            Rejected(
+            Rejection(
                 When.of(row),
                 choice_name(Reason, int(row["reason"])),
                 row["q"].tolist(),
@@ -177,7 +296,7 @@ class NodeTrace:
 
 
 def _parents_before(made: Changes) -> NDArray[np.int64]:
-    """Return which parent each change takes the place of, -1 where the node joins, shape (m,)."""
+    """Return the parent that each change replaces, -1 if the node joins, shape (m,)."""
     order = np.argsort(made.node, kind="stable")
     node, parent = made.node[order], made.parent[order]
     before = np.full(len(order), -1, np.int64)
@@ -187,5 +306,5 @@ def _parents_before(made: Changes) -> NDArray[np.int64]:
 
 
 def tree_name(tree: int) -> str:
-    """Say what a tree grows from."""
-    return NAMES.get(tree, "of its own")
+    """Name a tree: `tree 0 (start)`."""
+    return f"tree {tree} ({_NAMES[tree]})" if tree in _NAMES else f"tree {tree}"

@@ -1,62 +1,19 @@
-"""A run at an instant: trees, metrics, paths, nodes, each folded when it is asked for."""
+"""A run at an instant: trees, metrics, paths, nodes, each folded when it is first used."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 from brrt.errors import BrrtError
-from brrt.events import Events, Instant, Kind
+from brrt.events import Events, Kind
 from brrt.recording import Limits, Memory, Recording, instant
 from brrt.replay.cell_history import CellHistory, CellTrace
+from brrt.replay.fold import Fold, feed, until
 from brrt.replay.forest import Tree, forest
-from brrt.replay.history_records import NodeHistory
 from brrt.replay.metrics import Metrics, Path
-from brrt.replay.node_history import NodeTrace
+from brrt.replay.node_history import NodeHistory, NodeTrace
 
-
-class Fold(Protocol):
-    """What takes in events, batch by batch."""
-
-    def write(self, events: Events) -> None:
-        """Take a batch."""
-
-
-def feed(
-    batches: Iterable[Events], folds: Iterable[Fold], limits: Limits
-) -> tuple[int, Instant] | None:
-    """Hand the events up to the limits to the folds; read no batch beyond the one that has them.
-
-    Args:
-        batches: A log.
-        folds: What takes them in.
-        limits: The instant, as `Events.until` takes it; the end where it is empty.
-
-    Returns:
-        How many events there are and when the last one happened; None if the limits cut them.
-    """
-    folds = list(folds)
-    count, last = 0, Instant(0, 0)
-    for batch in batches:
-        part = batch.until(**limits) if limits else batch
-        for fold in folds:
-            fold.write(part)
-        if len(part) < len(batch):
-            return None
-        count, last = count + len(batch), batch.last if len(batch) else last
-    return count, last
-
-
-def until(batches: Iterable[Events], limits: Limits) -> Iterator[Events]:
-    """Yield the events up to an instant; read no batch beyond the one that holds it."""
-    for batch in batches:
-        part = batch.until(**limits) if limits else batch
-        yield part
-        if len(part) < len(batch):
-            return
-
-
-_LIMITS = {"seq": "event", "iteration": "iteration"}
+_NAMES = {"t": "time", "seq": "event", "iteration": "iteration"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,12 +30,9 @@ class Snapshot:
 
     def __repr__(self) -> str:
         scenario = self.recording.manifest.scenario
-        instant = ", ".join(
-            f"after {value / 1e9:g} s" if name == "t" else f"after {_LIMITS[name]} {value:,}"
-            for name, value in self.limits.items()
-        )
         run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"
-        return f"<Snapshot of {run}: {instant or 'its end'}>"
+        ends = [f"{_NAMES[name]} {_shown(name, value)}" for name, value in self.limits.items()]
+        return f"<Snapshot of {run}, after {ends[0] if ends else 'its last event'}>"
 
     @cached_property
     def events(self) -> Events:
@@ -102,7 +56,7 @@ class Snapshot:
 
     @cached_property
     def metrics(self) -> Metrics:
-        """The metrics, as `brrt replay` prints them: `metrics.as_dict()`."""
+        """The metrics; `metrics.as_dict()` is what `brrt replay --json` prints."""
         metrics = Metrics(self.recording.manifest)
         self.feed(metrics)
         return metrics
@@ -129,17 +83,21 @@ class Snapshot:
         if trace.has_trees or not cell.has_cells:
             return trace.history(run.robot(), run.world)
         if tree != 0:
-            raise BrrtError("a planner on a lattice has cells and no trees; leave the tree out")
+            raise BrrtError("a run on a lattice has cells and no trees; give no tree")
         return cell.history(run.robot())
 
     def feed(self, *folds: Fold) -> None:
-        """Pass the events to folds, such as `Metrics`, in one pass over the recording."""
-        feed(self._batches(), folds, {})
+        """Pass the events to folds, such as `Metrics`, in one pass."""
+        feed(self._batches(), folds)
 
     def _batches(self) -> Iterator[Events]:
-        """Yield the events up to the instant; from memory if they have been read before."""
+        """Yield the events up to the instant; from memory once `events` was used."""
         known = self.__dict__.get("events")
         yield from until(self.recording.batches(), self.limits) if known is None else [known]
+
+
+def _shown(name: str, value: int) -> str:
+    return f"{value / 1e9:g} s" if name == "t" else f"{value:,}"
 
 
 def snapshot(
@@ -151,7 +109,7 @@ def snapshot(
 ) -> Snapshot:
     """Return a run at an instant; at its end if none is given.
 
-    Nothing is read until a property of it is used, and then no further than the instant.
+    Nothing is read until a property is used, and then no batch after the instant.
 
     Args:
         recording: The run.

@@ -1,4 +1,4 @@
-"""A run told in plain text: the same on every machine, so that accounts can be compared.
+"""A run as plain text that is the same on every machine, so that transcripts can be compared.
 
 Times, versions and folders are left out, and numbers are rounded to six digits.
 """
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
+from brrt.replay.fold import feed
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
 
@@ -19,7 +20,7 @@ Line = tuple[int, str]
 """Iteration and text."""
 
 _LEAST_GAIN = 0.01
-"""How much better a path must be than the last one told of; there may be thousands."""
+"""How much better a path must be than the last one printed; there may be thousands."""
 
 _COUNTED: Mapping[Kind, tuple[str, str | None]] = {
     Kind.SAMPLE: ("samples", "source"),
@@ -32,20 +33,20 @@ _COUNTED: Mapping[Kind, tuple[str, str | None]] = {
     Kind.SHORTCUT: ("shortcuts", "accepted"),
     Kind.MOVE: ("moves", None),
 }
-"""What the events of a phase are called, and the field that tells them apart."""
+"""What the events of a phase are called, and the field by which they are divided."""
 
 
 class Transcript:
-    """A sink that tells what happened; its memory does not grow with the run.
+    """A fold that writes down what happened, in constant memory.
 
     Args:
-        manifest: The run's.
-        robot: What moves; measures how near to the goal the tree came.
+        manifest: The run's manifest.
+        robot: The robot, which measures the distance to the goal.
     """
 
     def __init__(self, manifest: Manifest, robot: Robot) -> None:
         self._manifest, self._robot = manifest, robot
-        self._told: list[Line] = []
+        self._lines: list[Line] = []
         self._counts: dict[tuple[Kind, int], int] = {}
         self._path: Any = None
         self._best = np.inf
@@ -54,7 +55,7 @@ class Transcript:
         self._iteration = 0
 
     def write(self, events: Events) -> None:
-        """Take in a batch."""
+        """Take a batch."""
         marks = [*events[Kind.PHASE], *events[Kind.PATH]]
         marks.sort(key=lambda event: int(event["seq"]))
         first = 0
@@ -62,20 +63,20 @@ class Transcript:
             self._count(events, first, int(event["seq"]))
             first = int(event["seq"])
             if "stage" in event.dtype.names:
-                self._tell_path(event)
+                self._add_path(event)
             else:
-                self._tell_phase(event)
+                self._add_phase(event)
         self._count(events, first, np.iinfo(np.int64).max)
         if len(events):
             self._iteration = max(self._iteration, events.last.iteration)
 
     def lines(self) -> Iterator[str]:
-        """Tell what is known so far, line by line."""
+        """Yield the transcript so far, line by line."""
         yield from self._head()
-        told = [*self._told, *self._newest(), *self._counted()]
-        width = max((len(f"{number:,}") for number, _ in told), default=1)
+        lines = [*self._lines, *self._newest(), *self._counted()]
+        width = max((len(f"{number:,}") for number, _ in lines), default=1)
         before = None
-        for number, text in told:
+        for number, text in lines:
             count = "" if number == before else f"{number:,}"
             yield f"{count:>{width}}  {text}"
             before = number
@@ -95,7 +96,7 @@ class Transcript:
             yield f"at iteration {branch.iteration:,} of {branch.file}: " + branch.told(after)
 
     def _count(self, events: Events, first: int, end: int) -> None:
-        """Count the events whose numbers lie in a range."""
+        """Count the events with numbers from `first` to `end`."""
         for kind, (_, choice) in _COUNTED.items():
             table = events[kind]
             part = table[np.searchsorted(table["seq"], first) : np.searchsorted(table["seq"], end)]
@@ -109,7 +110,7 @@ class Transcript:
                 self._approach(part)
 
     def _approach(self, edges: Table) -> None:
-        """Keep the node of the start's tree that came nearest to the goal."""
+        """Keep the node of the start's tree that is nearest to the goal."""
         mine = edges[edges["tree"] == 0]
         if len(mine):
             goal = np.array(self._manifest.goal)
@@ -118,20 +119,20 @@ class Transcript:
             here = (float(far[best]), int(mine["node"][best]), int(mine["iteration"][best]))
             self._nearest = min(self._nearest, here, key=lambda found: found[0])
 
-    def _tell_phase(self, event: Any) -> None:
+    def _add_phase(self, event: Any) -> None:
         phase, status = Phase(int(event["name"])), Status(int(event["status"]))
         iteration = int(event["iteration"])
         if status is Status.BEGIN:
-            self._told.append((iteration, f"{phase.name.lower()} begins"))
+            self._lines.append((iteration, f"{phase.name.lower()} begins"))
             return
-        self._told += self._newest()
-        self._told += [(iteration, text) for _, text in self._counted()]
+        self._lines += self._newest()
+        self._lines += [(iteration, text) for _, text in self._counted()]
         self._counts.clear()
         self._skipped = None
         how = status.name.lower().replace("_", " ")
-        self._told.append((iteration, f"{phase.name.lower()} ends: {how}"))
+        self._lines.append((iteration, f"{phase.name.lower()} ends: {how}"))
         if phase is Phase.PLAN and self._path is None:
-            self._told += [(iteration, text) for text in self._failure()]
+            self._lines += [(iteration, text) for text in self._failure()]
 
     def _failure(self) -> Iterator[str]:
         far, node, iteration = self._nearest
@@ -142,7 +143,7 @@ class Transcript:
                 f"{far:.6g} away from it"
             )
 
-    def _tell_path(self, event: Any) -> None:
+    def _add_path(self, event: Any) -> None:
         stage, cost = Stage(int(event["stage"])), float(event["cost"])
         waypoints = len(event["waypoints"])
         name = "first path" if self._path is None else f"{stage.name.lower()} path"
@@ -155,14 +156,14 @@ class Transcript:
             self._skipped = line
             return
         self._best, self._skipped = cost, None
-        self._told.append(line)
+        self._lines.append(line)
 
     def _newest(self) -> list[Line]:
-        """Tell of the best path so far, if it was not worth it when it came."""
+        """Return the best path so far if it was left out."""
         return [] if self._skipped is None else [self._skipped]
 
     def _counted(self) -> Iterator[Line]:
-        """Say what was counted since the phase began."""
+        """Yield the counts since the phase began."""
         for kind, (word, choice) in _COUNTED.items():
             found = {value: n for (k, value), n in sorted(self._counts.items()) if k is kind}
             if not found:
@@ -174,7 +175,7 @@ class Transcript:
 
 
 def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
-    """Say how many there are of each sort, where there are sorts."""
+    """Write how many events there are with each value of a field."""
     if choice is None or (choice == "tree" and len(found) == 1):
         return ""
     if choice == "accepted":
@@ -186,13 +187,13 @@ def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
 
 
 def choice_name(choices: type[IntEnum] | None, value: int) -> str:
-    """Name a choice in words; a number that is none of the choices stays what it is."""
+    """Name a choice in words; a number that is none of the choices is kept."""
     known = choices is not None and value in set(choices)
     return choices(value).name.lower().replace("_", " ") if known and choices else str(value)
 
 
 def _last_name(spec: str) -> str:
-    """Leave out the folders of a file."""
+    """Return a file's name without its folders."""
     return spec.rsplit("/", 1)[-1]
 
 
@@ -203,8 +204,7 @@ def _text(value: Any) -> str:
 
 
 def transcript(recording: Recording) -> str:
-    """Return a run as plain text without times: the same on every machine."""
+    """Return a run as plain text without times, the same on every machine."""
     found = Transcript(recording.manifest, recording.robot())
-    for batch in recording.batches():
-        found.write(batch)
+    feed(recording.batches(), [found])
     return "\n".join(found.lines()) + "\n"

@@ -488,8 +488,8 @@ def test_events_left_out_add_up(brrt: Command) -> None:
     brrt("plan", "--world", "gap2d:gap=1", "--iterations", 500, "--out", "run.mcap")
     node = int(np.bincount(read(Path("run.mcap")).events()[Kind.REJECT]["node"]).argmax())
     done = brrt("replay", "run.mcap", "--node", node).out
-    told = re.search(r"(\d+) extensions? from it", done)
-    more = re.search(r"\.\.\. (\d+) more, the last of these:", done)
+    told = re.search(r"(\d+) extensions? from this node", done)
+    more = re.search(r"\.\.\. (\d+) more, the last:", done)
     assert told is not None
     assert more is not None
     listed = re.findall(r"^ +event ", done, re.MULTILINE)
