@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from brrt import Events, Kind, McapSink, Run, Scenario, World, check, read
+from brrt import Events, Kind, McapSink, Problem, Run, Scenario, World, check, read
 from brrt.formats.background import Background
 from brrt.recording import Result
 
@@ -121,7 +121,7 @@ class Bench:
 
     def export(self, case: Case) -> Path:
         """Write a case's world for the peer."""
-        problem = Scenario(world=case.world, start=case.start, goal=case.goal).make_problem()
+        problem = Problem.of(Scenario(world=case.world, start=case.start, goal=case.goal))
         path = self.folder / "world.txt"
         export(path, problem.world, problem.start, problem.goal)
         return path

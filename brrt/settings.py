@@ -70,6 +70,12 @@ class Settings:
         return {f.name: getattr(self, f.name) for f in _params(self)}
 
     @classmethod
+    def greatest_values(cls) -> dict[str, float]:
+        """Return the greatest value of each setting that has one."""
+        limits = {f.name: f.metadata["high"] for f in _params(cls)}
+        return {name: high for name, high in limits.items() if high is not None}
+
+    @classmethod
     def describe(cls) -> list[dict[str, str]]:
         """One row a setting, for tables: name, default, unit, range, doc."""
         hints = get_type_hints(cls)
@@ -130,15 +136,18 @@ def _range_text(meta: Mapping[str, Any], hint: Any) -> str:
 
 def _typed(name: str, value: Any, hint: Any) -> Any:
     """Bring `value` to the type of `hint`, or say what is wrong with it."""
+    if type(None) in get_args(hint):
+        if value is None or value in ("auto", ""):
+            return None
+        (hint,) = (a for a in get_args(hint) if a is not type(None))
     if get_origin(hint) is Literal:
         if value not in get_args(hint):
             raise unknown(f"value of {name}", str(value), map(str, get_args(hint)))
         return value
-    allowed = get_args(hint) or (hint,)
-    if type(None) in allowed:
-        if value is None or value in ("auto", ""):
-            return None
-        (hint,) = (a for a in allowed if a is not type(None))
+    if hint is str:
+        if not isinstance(value, str):
+            raise BrrtError(f"{name} must be a text, not {value!r}")
+        return value
     if hint is bool:
         return _as_bool(name, value)
     try:

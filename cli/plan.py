@@ -13,6 +13,7 @@ from rich.markup import escape
 from .console import SIGNALLED, Code, Watch, note, out, print_json, print_summary, tell_of_compiling
 from .instants import At, AtEvent, AtIteration, instant
 from .numbers import whole_number
+from .signals import stop_on_signals
 
 if TYPE_CHECKING:
     from brrt.recording import Sink
@@ -178,7 +179,6 @@ def plan(
     brrt plan --from run.mcap --at-iteration 100 --param step=2
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.planners.base.stop import stop_on_signals  # noqa: PLC0415
     from brrt.runs.run import Run  # noqa: PLC0415
 
     from .outputs import check_display, check_output  # noqa: PLC0415
@@ -233,14 +233,15 @@ def plan(
 
 def _merged(file: Path | None, given: dict[str, Any], params: list[str]) -> "Scenario":
     """Put what was given on the command line on top of the file, if there is one."""
+    from brrt.planners import check_params, load_scenario  # noqa: PLC0415
     from brrt.scenario.scenario import Scenario  # noqa: PLC0415
 
-    base = Scenario() if file is None else Scenario.load(file)
+    base = Scenario() if file is None else load_scenario(file)
     values = {**base.as_dict(), **given}
     if values["planner"] != base.planner:
         values["params"] = {}
     values["params"] = {**values["params"], **_params(params)}
-    return Scenario.parse(values)
+    return check_params(Scenario.parse(values))
 
 
 def _params(texts: list[str]) -> dict[str, str]:

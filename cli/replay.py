@@ -85,6 +85,7 @@ def replay(
     from brrt.replay.metrics import Metrics  # noqa: PLC0415
     from brrt.replay.transcript import Transcript  # noqa: PLC0415
     from brrt.replay.tree_stats import TreeStats  # noqa: PLC0415
+    from brrt.scenario.contracts import origins_of  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
@@ -118,7 +119,7 @@ def replay(
         print_json(figures if check is None else {**figures, "check": verdict})
     elif told is None:
         grown = trees.figures()  # where they are no trees, nothing is told of the run
-        print_summary(figures, recording.manifest.origins)
+        print_summary(figures, origins_of(recording.manifest))
         _show_trees(grown)
         for each in recent:
             print_lines(event_lines(each.before(each.next)))

@@ -64,7 +64,7 @@ def verify(
     brrt verify run.mcap --rerun
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.planners import PLANNERS  # noqa: PLC0415
+    from brrt.scenario.contracts import contracts_of  # noqa: PLC0415
     from brrt.verification import examine  # noqa: PLC0415
 
     if tolerance is not None and (not rerun or not tolerance >= 0):
@@ -79,9 +79,9 @@ def verify(
     )  # fmt: skip
     cut, events = saved.cut or recording.result is None, saved.events
     broken = sum(result.broken for result in results)
+    known = contracts_of(recording.manifest, recording.world)[-1] is not None
     again = _again(recording, saved, tolerance) if rerun else None
     if as_json:
-        known = planner in PLANNERS
         print_json(
             {
                 "holds": not broken,
@@ -95,7 +95,7 @@ def verify(
     else:
         if cut and not saved.cut:
             note(f"{run} breaks off; what is promised of a run's end was left out")
-        if planner not in PLANNERS:
+        if not known:
             note(f"planner {planner} is not known here; its special promises were not checked")
         _show(run, results, long=long)
         if again is not None:

@@ -11,6 +11,7 @@ import typer
 from .console import SIGNALLED, Watch, out
 from .instants import At, AtEvent, AtIteration, beyond, instant
 from .saved import Saved, opened
+from .signals import handling_signals
 
 if TYPE_CHECKING:
     from brrt.events import Events
@@ -81,8 +82,6 @@ def view(
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
-    from brrt.planners.base.stop import handling_signals  # noqa: PLC0415 - keep --help fast
-
     # Ended by a signal as by Ctrl-C, nothing that we started or wrote for a while outlives us.
     with tempfile.TemporaryDirectory(prefix="brrt-") as folder, handling_signals(_end):
         with Watch(None, "drawing").running() as watch:

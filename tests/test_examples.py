@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from brrt import Run, Scenario
+from brrt import Problem, Run, Scenario
 from tests.conftest import Result
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -134,7 +134,7 @@ def test_each_seed_has_its_query() -> None:
     """Circles and squares: start and goal change with the seed, the world does not."""
     for name in ("circles", "squares"):
         base = Scenario.load(EXAMPLES / f"{name}.toml")
-        problems = [replace(base, seed=seed).make_problem() for seed in range(5)]
+        problems = [Problem.of(replace(base, seed=seed)) for seed in range(5)]
         assert len({tuple(problem.start) for problem in problems}) == 5
         assert len({problem.world.to_json() for problem in problems}) == 1
 

@@ -2,12 +2,13 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from brrt.errors import BrrtError
+from brrt.scenario.contract import Contract
+from brrt.scenario.contracts import contract_of, origins_of, planner_settings
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import MOST
 from brrt.worlds.world import World
@@ -45,18 +46,29 @@ def settings_of(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Ite
     ours, theirs = a.scenario, b.scenario
     for name in _PLAIN:
         yield from _row(name, getattr(ours, name), getattr(theirs, name))
-    limits = (each.make_stop().iterations for each in (ours, theirs))
+    contracts = _contract(a, a_world), _contract(b, b_world)
+    limits = (
+        each.iteration_limit(contract.planner.default_iterations)
+        for each, contract in zip((ours, theirs), contracts, strict=True)
+    )
     yield from _row("iterations", *("no limit" if n >= MOST else n for n in limits))
     yield from _branches(a, b)
     robots = list(rows_of("robot", _robot(a, a_world), _robot(b, b_world)))
     worlds = list(_worlds(a_world, b_world))
-    told = [(each.planner, each.settings()) for each in (ours, theirs)]
-    if told[0] != told[1] or robots or worlds:
-        yield from _params(a, a_world, b, b_world)
+    settings = planner_settings(a)[-1], planner_settings(b)[-1]
+    if ours.planner != theirs.planner or settings[0] != settings[1] or robots or worlds:
+        yield from _params(settings, (contracts[0].planner.chosen, contracts[1].planner.chosen))
     yield from robots
     yield from _row("start", list(a.start), list(b.start))
     yield from _row("goal", list(a.goal), list(b.goal))
     yield from worlds
+
+
+def _contract(manifest: Manifest, world: World) -> Contract:
+    try:
+        return contract_of(manifest, world)
+    except BrrtError:  # start or goal is not free in this world
+        return Contract()
 
 
 def versions_of(a: Manifest, b: Manifest) -> Iterator[Row]:
@@ -77,12 +89,13 @@ def rows_of(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator
         yield from _row(f"{prefix} {name}".strip(), a.get(name), b.get(name))
 
 
-def _params(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Iterator[Row]:
-    """Yield the planner's settings that differ, those that it decides as they come out."""
-    given = a.scenario.settings(), b.scenario.settings()
-    decided = _decided(a, a_world), _decided(b, b_world)
+def _params(
+    given: tuple[Mapping[str, Any], Mapping[str, Any]],
+    chosen: tuple[Mapping[str, float], Mapping[str, float]],
+) -> Iterator[Row]:
+    """Yield the planner's settings that differ; of automatic ones the values that it chose."""
     for name in dict.fromkeys([*given[0], *given[1]]):
-        pairs = zip(given, decided, strict=True)
+        pairs = zip(given, chosen, strict=True)
         values = [auto.get(name, own.get(name)) for own, auto in pairs]
         if values[0] == values[1]:
             continue
@@ -99,37 +112,19 @@ def _auto(value: Any, digits: int = 6) -> str:
     return f"auto: {value:.{digits}g}" if isinstance(value, float) else "auto"
 
 
-def _decided(manifest: Manifest, world: World) -> dict[str, float]:
-    """Return what the settings come out as that the planner decides for its problem."""
-    scenario = manifest.scenario
-    own = [name for name, value in scenario.settings().items() if value is None]
-    if not own:
-        return {}
-    query = replace(scenario, start=manifest.start, goal=manifest.goal)
-    try:
-        problem = query.make_problem(world, manifest.make_robot())
-        contract = scenario.make_planner().contract(problem)
-    except BrrtError:  # a planner that is not known here, or a query that is of no use
-        return {}
-    lengths = {
-        "step": contract.step,
-        "gamma": None if contract.near is None else contract.near.gamma,
-        "connect_distance": contract.link,
-    }
-    return {name: value for name, value in lengths.items() if name in own and value is not None}
-
-
 def _branches(a: Manifest, b: Manifest) -> Iterator[Row]:
     """Say from what each run branched; also what changed there, where it was not the same."""
     brief = [", ".join(turn.origin for turn in each.branches) or "none" for each in (a, b)]
-    full = ["; ".join(each.origins) or "none" for each in (a, b)]
+    full = ["; ".join(origins_of(each)) or "none" for each in (a, b)]
     if _turns(a) != _turns(b):
         yield Row("branched from", *(brief if brief[0] != brief[1] else full))
 
 
 def _turns(manifest: Manifest) -> list[Any]:
     """Return what decides a run whose settings changed on the way; names of files do not."""
-    return [(turn.iteration, turn.seed, turn.scenario.settings()) for turn in manifest.branches]
+    settings = planner_settings(manifest)[:-1] if manifest.branches else ()
+    pairs = zip(manifest.branches, settings, strict=True)
+    return [(branch.iteration, branch.seed, values) for branch, values in pairs]
 
 
 def _robot(manifest: Manifest, world: World) -> dict[str, Any]:

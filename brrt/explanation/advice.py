@@ -7,13 +7,9 @@ from brrt.explanation.commands import Advice, anew, change, further, go_on, look
 from brrt.explanation.diagnosis import fitting_step, limited, step_of, stuck
 from brrt.explanation.facts import Facts
 from brrt.explanation.report import place
-from brrt.planners import PLANNERS
 
 MOST = 3
 """Advice that is given at most."""
-
-_CLIMBING = ("rrt-star", "bi-rrt-star")
-"""Planners that go on improving."""
 
 Rule = Callable[[Facts], Advice | None]
 
@@ -23,7 +19,7 @@ def advise(facts: Facts) -> list[Advice]:
     found: list[Advice] = []
     idle: set[Rule] = set()
     rules = _SOLVED if facts.figures["solved"] else _UNSOLVED
-    if facts.scenario.planner not in PLANNERS:  # nothing could run it again
+    if not facts.contract.planner.registered:  # nothing could run it again
         rules = _LOOKS
     for rule in rules:
         advice = None if rule in idle else rule(facts)
@@ -66,24 +62,25 @@ def short_step(f: Facts) -> Advice | None:
 
 def look_ahead(f: Facts) -> Advice | None:
     """LRTA* goes in and out of the same cells: it is in a depression of its estimates."""
-    often = f.cells.get("moves_per_cell", 0.0)
-    lookahead = f.scenario.settings().get("lookahead")
-    if lookahead is None or often < 2:
+    often, lattice = f.cells.get("moves_per_cell", 0.0), f.contract.lattice
+    if lattice is None or lattice.lookahead is None or often < 2:
         return None
+    ten = 10 * lattice.lookahead
+    most = int(f.contract.planner.greatest.get("lookahead", ten))
     deepest = f.cells["deepest"]
     why = (
         f"each cell was entered {often:.3g} times on average; the estimate at "
         f"{place(deepest['q'])} had to rise by {deepest['learnt']:.4g}"
     )
     if limited(f):  # what was learnt stays right whatever the lookahead is
-        return further(f, why, 10, params={"lookahead": min(10_000, max(100, 10 * lookahead))})
-    return change(f, why, params={"lookahead": min(10_000, max(10, 10 * lookahead))})
+        return further(f, why, 10, params={"lookahead": min(most, max(100, ten))})
+    return change(f, why, params={"lookahead": min(most, max(10, ten))})
 
 
 def enough(f: Facts) -> Advice | None:
     """The second half of a run that improves its path brought next to nothing."""
     p = f.progress
-    if f.scenario.planner not in _CLIMBING or p is None or p.half_cost is None:
+    if not f.contract.improves or p is None or p.half_cost is None:
         return None
     gain = 1 - p.best_cost / p.half_cost if p.half_cost > 0 else 0.0
     if gain >= 0.01:
@@ -98,8 +95,10 @@ def enough(f: Facts) -> Advice | None:
 
 def informed(f: Facts) -> Advice | None:
     """Once there is a path, samples that cannot improve it were drawn all the same."""
-    p, settings = f.progress, f.scenario.settings()
-    if p is None or settings.get("informed") is not False or settings.get("stop_at_first"):
+    p, draws = f.progress, f.contract.draws
+    if p is None or draws is None or draws.informed or not f.contract.improves:
+        return None
+    if f.contract.stops:
         return None
     after = 1 - p.first / max(f.figures["iterations"], 1)
     if after < 0.5 or f.approach is None or p.best_cost < 1.02 * f.approach.start:
@@ -114,7 +113,7 @@ def late_moves(f: Facts) -> Advice | None:
         return None
     slowest, deadline = f.figures["max_move_time_s"], f.scenario.deadline
     why = f"the slowest move took {slowest:.3g} s; the deadline is {deadline:g} s"
-    if f.scenario.planner in _CLIMBING and f.figures["plan_time_s"]:
+    if f.contract.improves and f.figures["plan_time_s"]:
         part = 0.8 * deadline / f.figures["plan_time_s"]
         iterations = int(part * f.figures["iterations"])
         p = f.progress
@@ -122,14 +121,15 @@ def late_moves(f: Facts) -> Advice | None:
         if p is not None and iterations > max(p.first, began):
             return change(f, why, iterations=int(rounded(iterations)), time=None)
         return change(f, why, params={"stop_at_first": True})
-    if f.scenario.planner == "rrt":
-        return change(f, why, planner="rrt-connect", params={})
+    if f.contract.planner.bidirectional is not None and not f.contract.improves:
+        return change(f, why, planner=f.contract.planner.bidirectional, params={})
     return change(f, why, deadline=rounded(2 * slowest))
 
 
 def slow_tree(f: Facts) -> Advice | None:
     """One tree spent most of the run in front of the passage, and reached nothing new there."""
-    if f.scenario.planner != "rrt" or f.narrow is None or f.narrow.through is None:
+    planner = f.contract.planner.bidirectional
+    if planner is None or f.contract.improves or f.narrow is None or f.narrow.through is None:
         return None
     before = f.narrow.through / max(f.figures["iterations"], 1)
     drought = 0.0 if f.coverage is None else f.coverage.drought
@@ -140,7 +140,7 @@ def slow_tree(f: Facts) -> Advice | None:
         f"{drought:.0%} of it nothing new was reached"
     )
     step = f.scenario.params.get("step")
-    return change(f, why, planner="rrt-connect", params={} if step is None else {"step": step})
+    return change(f, why, planner=planner, params={} if step is None else {"step": step})
 
 
 _LOOKS: tuple[Rule, ...] = (failed.no_way, failed.too_wide)

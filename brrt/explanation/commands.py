@@ -10,8 +10,6 @@ from typing import Any
 from brrt.explanation.diagnosis import limited
 from brrt.explanation.facts import Facts
 from brrt.explanation.report import WIDTH
-from brrt.planners import PLANNERS
-from brrt.planners.base.kernel_planner import KernelPlanner
 from brrt.scenario.command import plan_words, setting_words
 from brrt.scenario.scenario import Scenario
 
@@ -141,9 +139,8 @@ def change(
         params: Settings of the planner that are changed.
         settings: Other fields of the scenario; None takes a limit away.
     """
-    kind = PLANNERS[f.scenario.planner]
-    fixed_params = kind.fixed_params if issubclass(kind, KernelPlanner) else ()
-    if f.manifest.branches and planner is None and not set(fixed_params) & set(params or {}):
+    fixed = set(f.contract.planner.fixed_params)
+    if f.manifest.branches and planner is None and not fixed & set(params or {}):
         given = {name: value for name, value in settings.items() if value is not None}
         here = f.manifest.branches[-1].iteration
         return go_on(f, why, iteration=here, params=params, **given)

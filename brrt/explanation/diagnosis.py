@@ -41,7 +41,7 @@ def grows(f: Facts) -> bool:
 
 def step_of(f: Facts) -> float | None:
     """Return the longest edge that the planner makes; None where it makes none."""
-    return None if f.contract is None else f.contract.step
+    return f.contract.step
 
 
 def fitting_step(f: Facts) -> float:

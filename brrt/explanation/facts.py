@@ -10,14 +10,13 @@ from brrt.events import Reason, Source
 from brrt.explanation.clearance import Narrow, Way, Ways
 from brrt.explanation.gather import FAILED, Gather
 from brrt.explanation.places import Blocker, Coverage, Gap, Places, Spot
-from brrt.planners import PLANNERS
 from brrt.replay.snapshot import Snapshot
 from brrt.replay.transcript import choice_name
 from brrt.robots import Robot
 from brrt.scenario.contract import Contract
+from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
-from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 
@@ -111,7 +110,7 @@ class Facts:
         manifest: The run's.
         file: The recording, as the command line takes it; empty where it is in no file.
         ended: Whether the recording is told to its end, and not to an instant before.
-        contract: What its planner promises, as its step; None where it is not known here.
+        contract: What its planner promises, as its step; empty if it is not known.
         sides: Those of the world's bounds.
         figures: Those that `brrt replay --json` prints.
         tenths: The run's course.
@@ -133,7 +132,7 @@ class Facts:
     manifest: Manifest
     file: str
     ended: bool
-    contract: Contract | None
+    contract: Contract
     sides: list[float]
     figures: dict[str, Any]
     tenths: list[Tenth]
@@ -202,7 +201,7 @@ def facts(moment: Snapshot, file: str, robot: Robot, gather: Gather) -> Facts:
     figures = gather.metrics.as_dict()
     rejects = gather.rejects.rows()
     ends = gather.origins(rejects), np.asarray(rejects["q"])
-    contract = _contract(manifest, world)
+    contract = contract_of(manifest, world)
     return Facts(
         manifest=manifest,
         file=file,
@@ -227,16 +226,8 @@ def facts(moment: Snapshot, file: str, robot: Robot, gather: Gather) -> Facts:
     )
 
 
-def _contract(manifest: Manifest, world: World) -> Contract | None:
-    if manifest.scenario.planner not in PLANNERS:
-        return None
-    return manifest.scenario.make_planner().contract(manifest.make_problem(world))
-
-
-def _way(
-    ways: Ways, start: Floats, goal: Floats, contract: Contract | None, *, solved: bool
-) -> Way:
-    way = ways.find(start, goal, None if contract is None else contract.step)
+def _way(ways: Ways, start: Floats, goal: Floats, contract: Contract, *, solved: bool) -> Way:
+    way = ways.find(start, goal, contract.step)
     # That there is one is proven by a run that took it.
     return replace(way, connected=True) if solved else way
 

@@ -18,12 +18,6 @@ from brrt.explanation.diagnosis import (
 from brrt.explanation.facts import Facts
 from brrt.explanation.report import counted, late
 
-ONE_TREE = {"rrt": "rrt-connect", "rrt-star": "bi-rrt-star"}
-"""What grows a second tree from the goal, instead of each planner."""
-
-_CHEAPER = {"bi-rrt-star": "rrt-connect", "rrt-star": "rrt"}
-"""What looks for a first path alone, with as many trees, instead of each planner."""
-
 MOST_CUT = 10
 """A step is never advised to be more than so many times shorter."""
 
@@ -63,7 +57,7 @@ def too_wide(f: Facts) -> Advice | None:
 
 def small_cells(f: Facts) -> Advice | None:
     """The lattice shows no path: its cells are too large for the passage, or for a narrower one."""
-    lattice = None if f.contract is None else f.contract.lattice
+    lattice = f.contract.lattice
     if lattice is None or f.figures["status"] != "no path":
         return None
     cells = f"cells of {lattice.epsilon:g}"
@@ -84,9 +78,10 @@ def small_cells(f: Facts) -> Advice | None:
 def _finer(f: Facts, why: str, epsilon: float) -> Advice:
     """Advise smaller cells and as many expansions; of too many cells, a planner without any."""
     cells = _cells(f, epsilon)
-    if cells > _ROOM:
-        return change(f, f"{why}; of {epsilon:g} there are {cells:.2g}", planner="rrt-connect")
-    if cells > f.scenario.make_stop().iterations:
+    about = f.contract.planner
+    if cells > _ROOM and about.continuous is not None:
+        return change(f, f"{why}; of {epsilon:g} there are {cells:.2g}", planner=about.continuous)
+    if cells > f.scenario.iteration_limit(about.default_iterations):
         return change(f, why, params={"epsilon": epsilon}, iterations=cells)
     return change(f, why, params={"epsilon": epsilon})
 
@@ -98,9 +93,10 @@ def _cells(f: Facts, epsilon: float) -> int:
 
 def goal_bias(f: Facts) -> Advice | None:
     """The goal was never drawn, or draws of it took much of the run in vain."""
-    bias = f.scenario.settings().get("goal_bias")
-    if bias is None or f.scenario.planner not in ONE_TREE:
+    draws = f.contract.draws
+    if draws is None or f.contract.planner.bidirectional is None:
         return None
+    bias = draws.goal_bias
     if bias == 0 and not f.figures["solved"]:
         return anew(f, "goal bias 0 never draws the goal", params={"goal_bias": 0.05})
     goals = f.goals
@@ -128,7 +124,7 @@ def young(f: Facts) -> Advice | None:
 
 def cramped(f: Facts) -> Advice | None:
     """Hardly an extension is accepted, and the tree does not get away: keep it cheap, and many."""
-    planner = _CHEAPER.get(f.scenario.planner)
+    planner = f.contract.planner.first_path
     if planner is None or not limited(f) or not scarce(f) or f.acceptance is None:
         return None
     if f.accepted + f.failed < _ENOUGH or f.approach is None or f.approach.since < 0.5:
@@ -142,7 +138,7 @@ def cramped(f: Facts) -> Advice | None:
 
 def second_tree(f: Facts) -> Advice | None:
     """One tree stopped growing in front of the passage, or came no nearer for half of the run."""
-    planner = ONE_TREE.get(f.scenario.planner)
+    planner = f.contract.planner.bidirectional
     if planner is None or f.approach is None or f.accepted + f.failed < _ENOUGH:
         return None
     if f.coverage is not None and f.coverage.late > _SPREADING:
@@ -184,8 +180,8 @@ def unseen(f: Facts) -> Advice | None:
 
 def all_cells(f: Facts) -> Advice | None:
     """The search for a shortest path on a lattice has its end: each cell is expanded once."""
-    lattice = None if f.contract is None else f.contract.lattice
-    if lattice is None or lattice.lookahead is not None or f.figures["status"] != "iteration limit":
+    lattice = f.contract.lattice
+    if lattice is None or f.contract.learns or f.figures["status"] != "iteration limit":
         return None
     cells = _cells(f, lattice.epsilon)
     if cells <= f.figures["iterations"]:

@@ -7,6 +7,7 @@ from textwrap import wrap
 from brrt.explanation.clearance import Narrow, at_least
 from brrt.explanation.diagnosis import width_of
 from brrt.explanation.facts import Facts
+from brrt.scenario.contracts import changes_of
 
 Row = tuple[str, str]
 
@@ -27,9 +28,9 @@ def rows(f: Facts) -> Iterator[Row]:
     """Tell the facts, the outcome first."""
     scenario = f.scenario
     yield "run", f"{scenario.planner} · {scenario.robot} · {scenario.world} · seed {scenario.seed}"
-    for branch, (_, after) in zip(f.manifest.branches, f.manifest.stretches[1:], strict=True):
+    for branch, change in zip(f.manifest.branches, changes_of(f.manifest), strict=True):
         file = branch.file or "another run"
-        yield "from", f"{file}, behind iteration {branch.iteration:,}: {branch.told(after)}"
+        yield "from", f"{file}, behind iteration {branch.iteration:,}: {change}"
     yield "outcome", _outcome(f)
     yield "grown", _grown(f)
     yield from _course(f)
@@ -215,7 +216,7 @@ def _paths(f: Facts) -> Iterator[Row]:
 
 def _cells(f: Facts) -> Iterator[Row]:
     cells = f.cells
-    if not cells or not cells["moves"] or "lookahead" not in f.scenario.settings():
+    if not cells or not cells["moves"] or not f.contract.learns:
         return
     busiest, deepest = cells["busiest"], cells["deepest"]
     often = cells["moves_per_cell"]

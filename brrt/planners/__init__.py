@@ -1,16 +1,23 @@
 """Planners: one file and one line here adds one."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+from brrt.errors import BrrtError, unknown
 from brrt.planners.a_star import AStar
-from brrt.planners.base.planner import Planner
+from brrt.planners.base.planner import Planner, StatesContract
+from brrt.planners.base.stop import Stop
 from brrt.planners.bi_rrt import BiRRT
 from brrt.planners.bi_rrt_star import BiRRTStar
 from brrt.planners.lrta_star import LRTAStar
 from brrt.planners.rrt import RRT
 from brrt.planners.rrt_connect import RRTConnect
 from brrt.planners.rrt_star import RRTStar
-from brrt.scenario.contract import Contract
+from brrt.scenario.contract import Contract, PlannerInfo
+from brrt.scenario.query import Query
+from brrt.scenario.scenario import Scenario
 
 PLANNERS: Mapping[str, type[Planner]] = {
     "rrt": RRT,
@@ -21,6 +28,87 @@ PLANNERS: Mapping[str, type[Planner]] = {
     "lrta-star": LRTAStar,
     "a-star": AStar,
 }
+
+
+def make_planner(scenario: Scenario) -> Planner:
+    """Make a scenario's planner with its settings.
+
+    Raises:
+        BrrtError: No planner has this name, or a parameter is unknown or out of range.
+    """
+    name = scenario.planner
+    if name not in PLANNERS:
+        raise unknown("planner", name, PLANNERS)
+    return PLANNERS[name].parse(f"planner {name}", scenario.params)
+
+
+def check_params(scenario: Scenario) -> Scenario:
+    """Return the scenario with its parameters in the types of the planner's settings.
+
+    Parameters of a planner that is not registered stay as they are.
+
+    Raises:
+        BrrtError: A parameter is unknown or out of range.
+    """
+    if scenario.planner not in PLANNERS:
+        return scenario
+    settings = make_planner(scenario).as_dict()
+    return replace(scenario, params={name: settings[name] for name in scenario.params})
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario from a TOML file and check its parameters.
+
+    Raises:
+        BrrtError: The file cannot be read or is not a scenario, or a parameter is wrong.
+    """
+    scenario = Scenario.load(path)
+    try:
+        return check_params(scenario)
+    except BrrtError as error:
+        raise BrrtError(f"{path}: {error}") from None
+
+
+def state_contract(planner: Any, query: Query) -> Contract | None:
+    """Return a planner's contract, with its settings; None for an object that states none.
+
+    Raises:
+        BrrtError: What the planner's method `contract` returns is not a contract.
+    """
+    if not isinstance(planner, StatesContract):
+        return None
+    contract: Any = planner.contract(query)
+    if not isinstance(contract, Contract):
+        kind = type(contract).__name__
+        raise BrrtError(f"contract() of a planner must return a brrt.Contract, not {kind}")
+    if not isinstance(planner, Planner):
+        return contract
+    settings, near = planner.as_dict(), contract.near
+    lengths = {
+        "step": contract.step,
+        "gamma": None if near is None else near.gamma,
+        "connect_distance": contract.link,
+    }
+    about = PlannerInfo(
+        registered=type(planner) in PLANNERS.values(),
+        default_iterations=planner.default_iterations,
+        bidirectional=planner.bidirectional,
+        first_path=planner.first_path,
+        continuous=planner.continuous,
+        settings=settings,
+        chosen={k: v for k, v in lengths.items() if v is not None and settings.get(k, 0) is None},
+        greatest=planner.greatest_values(),
+        fixed_params=planner.fixed_params,
+    )
+    return replace(contract, planner=about)
+
+
+def make_stop(scenario: Scenario) -> Stop:
+    """Make a scenario's budget."""
+    planner = PLANNERS.get(scenario.planner, Planner)
+    limit = scenario.iteration_limit(planner.default_iterations)
+    return Stop(iterations=limit, draws=scenario.draws, time_s=scenario.time)
+
 
 __all__ = [
     "PLANNERS",
@@ -33,4 +121,9 @@ __all__ = [
     "Planner",
     "RRTConnect",
     "RRTStar",
+    "check_params",
+    "load_scenario",
+    "make_planner",
+    "make_stop",
+    "state_contract",
 ]

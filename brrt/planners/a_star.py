@@ -20,6 +20,7 @@ from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.robots import Point
 from brrt.scenario import contract
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 _FIRST_ROOM = 1 << 18
@@ -34,6 +35,7 @@ class LatticePlanner(KernelPlanner):
     """What the searches on a lattice have in common; its cells begin at the start."""
 
     fixed_params: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
+    continuous: ClassVar[str | None] = "rrt-connect"
 
     epsilon: float = param(0.5, "edge of a cell", above=0)
     diagonals: bool = param(False, "move to all cells around (26 in 3D), not across faces alone")
@@ -70,7 +72,7 @@ class AStar(LatticePlanner):
     the cell closer to the goal, then to the one seen first.
     """
 
-    def contract(self, problem: Problem) -> contract.Contract:  # noqa: ARG002
+    def contract(self, query: Query) -> contract.Contract:  # noqa: ARG002
         """See `Planner.contract`."""
         grid = contract.Lattice(self.epsilon, self.diagonals, self.max_move, lookahead=None)
         return contract.Contract(lattice=grid)

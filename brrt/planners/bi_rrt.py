@@ -11,6 +11,7 @@ from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario.contract import Contract, Draws, Growth
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 _TURNS = {"alternate": _bi_rrt.ALTERNATE, "smaller": _bi_rrt.SMALLER, "coin": _bi_rrt.COIN}
@@ -43,9 +44,9 @@ class BiRRT(KernelPlanner):
         False, "head for the newest node of the other tree even where nothing could be added to it"
     )
 
-    def contract(self, problem: Problem) -> Contract:
+    def contract(self, query: Query) -> Contract:
         """See `Planner.contract`."""
-        step = step_length(self.step, problem)
+        step = step_length(self.step, query)
         growth = Growth(
             turn=self.turn,
             connects=self.grow == "connect",
@@ -65,9 +66,9 @@ class BiRRT(KernelPlanner):
         return loop_of(options, problem, stop)
 
 
-def step_length(step: float | None, problem: Problem, part: float = 0.05) -> float:
+def step_length(step: float | None, query: Query, part: float = 0.05) -> float:
     """Return the step that was set, or a part of the map's longest side."""
-    return step or part * problem.world.extent
+    return step or part * query.world.extent
 
 
 def loop_of(options: _bi_rrt.Options, problem: Problem, stop: Stop) -> Kernel[_bi_rrt.Trees]:

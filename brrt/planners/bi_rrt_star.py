@@ -1,7 +1,7 @@
 """Bidirectional RRT*: two trees that both choose parents and rewire."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from brrt.planners.base.kernel_planner import Kernel
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.planners.rrt_star import StarPlanner, loop_of
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 
@@ -22,13 +23,15 @@ class BiRRTStar(StarPlanner):
     `connect_distance` and the motion between them is free. Each better path is recorded.
     """
 
+    first_path: ClassVar[str | None] = "rrt-connect"
+
     connect_distance: float | None = param(
         None, "longest link between the trees; the step by default", above=0
     )
 
-    def options(self, problem: Problem) -> _rrt_star.Options:
+    def options(self, query: Query) -> _rrt_star.Options:
         """See `StarPlanner.options`."""
-        options = StarPlanner.options(self, problem)
+        options = StarPlanner.options(self, query)
         return options._replace(link=self.connect_distance or options.step)
 
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:

@@ -12,6 +12,7 @@ from brrt.planners.base.kernel_planner import UNLIMITED, Kernel
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario import contract
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 _MOST_AHEAD = 10_000
@@ -34,11 +35,12 @@ class LRTAStar(LatticePlanner):
     lookahead: int = param(1, "cells to expand before a move", low=1, high=_MOST_AHEAD)
     trials: int = param(1, "times to start over with what was learnt", low=1)
 
-    def contract(self, problem: Problem) -> contract.Contract:  # noqa: ARG002
+    def contract(self, query: Query) -> contract.Contract:  # noqa: ARG002
         """See `Planner.contract`."""
         grid = contract.Lattice(
-            self.epsilon, self.diagonals, self.max_move, self.lookahead, ordered=True
-        )
+            self.epsilon, self.diagonals, self.max_move, self.lookahead,
+            ordered=True, trials=self.trials,
+        )  # fmt: skip
         return contract.Contract(lattice=grid)
 
     def retracing(self, problem: Problem) -> Kernel[Any]:

@@ -1,7 +1,7 @@
 """Rapidly-exploring random tree (LaValle 1998)."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario.contract import Contract, Draws, Growth
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 _DRAWS_PER_ITERATION = 1000
@@ -25,6 +26,8 @@ class RRT(KernelPlanner):
     `step`, and adds the new node where the motion is free. It stops at the first path.
     """
 
+    bidirectional: ClassVar[str | None] = "rrt-connect"
+
     step: float | None = param(
         None, "longest edge; 5 % of the map's longest side by default", above=0
     )
@@ -36,18 +39,22 @@ class RRT(KernelPlanner):
     slices: int = param(10, "points of a vector, with keep_intermediate", low=1, high=1000)
     count_failed: bool = param(True, "draws that add no node count as iterations")
 
-    def contract(self, problem: Problem) -> Contract:
+    def contract(self, query: Query) -> Contract:
         """See `Planner.contract`."""
         return Contract(
-            step=self._step(problem),
+            step=self._step(query),
             line_of_sight=self.goal_test == "line-of-sight",
             draws=Draws(goal_bias=self.goal_bias),
-            growth=Growth(slices=self.slices if self.keep_intermediate else 1, goal_test=True),
+            growth=Growth(
+                slices=self.slices if self.keep_intermediate else 1,
+                goal_test=True,
+                counts_failed=self.count_failed,
+            ),
             stops=True,
         )
 
-    def _step(self, problem: Problem) -> float:
-        return self.step or 0.05 * problem.world.extent
+    def _step(self, query: Query) -> float:
+        return self.step or 0.05 * query.world.extent
 
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """See `KernelPlanner.loop`."""

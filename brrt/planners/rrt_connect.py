@@ -8,6 +8,7 @@ from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.planners.bi_rrt import BiRRT
 from brrt.scenario.contract import Contract
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 
@@ -23,9 +24,9 @@ class RRTConnect(KernelPlanner):
         None, "longest edge; 5 % of the map's longest side by default", above=0
     )
 
-    def contract(self, problem: Problem) -> Contract:
+    def contract(self, query: Query) -> Contract:
         """See `Planner.contract`."""
-        return self._variant.contract(problem)
+        return self._variant.contract(query)
 
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """See `KernelPlanner.loop`."""

@@ -13,6 +13,7 @@ from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.planners.bi_rrt import step_length
 from brrt.scenario.contract import Contract, Draws, Growth, Near
+from brrt.scenario.query import Query
 from brrt.settings import param
 
 DEFAULT_STEP = 0.2
@@ -41,13 +42,13 @@ class StarPlanner(KernelPlanner):
     )
     stop_at_first: bool = param(False, "stop at the first path")
 
-    def contract(self, problem: Problem) -> Contract:
+    def contract(self, query: Query) -> Contract:
         """See `Planner.contract`."""
-        options = self.options(problem)
+        options = self.options(query)
         return Contract(
             step=options.step,
             link=options.link or None,
-            near=Near(options.gamma, options.step, problem.dof),
+            near=Near(options.gamma, options.step, query.dof),
             draws=Draws(options.goal_bias, not options.link, informed=options.informed),
             growth=Growth(
                 turn="alternate" if options.link else None,
@@ -64,12 +65,12 @@ class StarPlanner(KernelPlanner):
         """See `KernelPlanner.ends_where`."""
         return self.stop_at_first
 
-    def options(self, problem: Problem) -> _rrt_star.Options:
-        """Return what the loop needs, with lengths resolved for a problem."""
+    def options(self, query: Query) -> _rrt_star.Options:
+        """Return what the loop needs, with lengths resolved for a query."""
         return _rrt_star.Options(
-            step=step_length(self.step, problem, DEFAULT_STEP),
+            step=step_length(self.step, query, DEFAULT_STEP),
             goal_bias=0.0,
-            gamma=self.gamma or proven_gamma(problem),
+            gamma=self.gamma or proven_gamma(query),
             informed=self.informed,
             stop_at_first=self.stop_at_first,
             link=0.0,
@@ -85,28 +86,31 @@ class RRTStar(StarPlanner):
     better path is recorded.
     """
 
+    bidirectional: ClassVar[str | None] = "bi-rrt-star"
+    first_path: ClassVar[str | None] = "rrt"
+
     goal_bias: float = param(
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
 
-    def options(self, problem: Problem) -> _rrt_star.Options:
+    def options(self, query: Query) -> _rrt_star.Options:
         """See `StarPlanner.options`."""
-        return StarPlanner.options(self, problem)._replace(goal_bias=self.goal_bias)
+        return StarPlanner.options(self, query)._replace(goal_bias=self.goal_bias)
 
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """See `KernelPlanner.loop`."""
         return loop_of(self.options(problem), problem.start[None], problem, stop)
 
 
-def proven_gamma(problem: Problem) -> float:
+def proven_gamma(query: Query) -> float:
     """Return 1.1 times the factor above which RRT* converges to the optimum.
 
     Karaman and Frazzoli 2011, theorem 38: (2 (1 + 1/d) V / B)^(1/d), where V is the volume of free
     space, here that of the bounds, which is no less, and B that of the robot's unit ball.
     """
-    d, (lower, upper) = problem.dof, problem.robot.bounds(problem.world)
-    volume = math.prod((upper - lower).tolist())
-    ball = problem.robot.unit_ball_volume(problem.world)
+    d = query.dof
+    volume = math.prod((query.upper - query.lower).tolist())
+    ball = query.robot.unit_ball_volume(query.world)
     return float(1.1 * (2 * (1 + 1 / d) * volume / ball) ** (1 / d))
 
 

@@ -14,6 +14,7 @@ from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.fold import feed
 from brrt.robots import Robot
+from brrt.scenario.contracts import changes_of, planner_settings
 from brrt.scenario.manifest import Manifest
 
 Line = tuple[int, str]
@@ -85,15 +86,13 @@ class Transcript:
         scenario = self._manifest.scenario
         world, robot = (_last_name(spec) for spec in (scenario.world, scenario.robot))
         yield f"{scenario.planner} · {robot} · {world} · seed {scenario.seed}"
-        settings = scenario.settings()
+        settings = planner_settings(self._manifest)[-1]
         if settings:
             yield "with " + ", ".join(f"{name} {_text(value)}" for name, value in settings.items())
         ends = (self._manifest.start, self._manifest.goal)
         yield "from {} to {}".format(*(", ".join(map(_text, q)) for q in ends))
-        for branch, (_, after) in zip(
-            self._manifest.branches, self._manifest.stretches[1:], strict=True
-        ):
-            yield f"at iteration {branch.iteration:,} of {branch.file}: " + branch.told(after)
+        for branch, change in zip(self._manifest.branches, changes_of(self._manifest), strict=True):
+            yield f"at iteration {branch.iteration:,} of {branch.file}: {change}"
 
     def _count(self, events: Events, first: int, end: int) -> None:
         """Count the events with numbers from `first` to `end`."""

@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from brrt.errors import BrrtError, unknown
 from brrt.events import Events, Kind, Phase, Status
-from brrt.planners import PLANNERS
+from brrt.planners import PLANNERS, check_params, make_planner, make_stop
 from brrt.planners.base.kernel_planner import KernelPlanner, KernelRun
 from brrt.planners.base.stop import Stop
 from brrt.scenario.manifest import Manifest
@@ -218,7 +218,7 @@ def changed(
     for name in ("start", "goal"):
         if isinstance(values[name], str):
             values[name] = getattr(manifest, name)
-    return Scenario.parse(values)
+    return check_params(Scenario.parse(values))
 
 
 def loop_planner(scenario: Scenario) -> KernelPlanner:
@@ -231,7 +231,7 @@ def loop_planner(scenario: Scenario) -> KernelPlanner:
         raise BrrtError(
             f"planner {scenario.planner} is not known here, so nobody can go on with it"
         )
-    planner = scenario.make_planner()
+    planner = make_planner(scenario)
     if not isinstance(planner, KernelPlanner):
         raise BrrtError(
             f"planner {scenario.planner} cannot be stopped and go on (it is no LoopPlanner): plan "
@@ -242,7 +242,7 @@ def loop_planner(scenario: Scenario) -> KernelPlanner:
 
 def plans_alike(before: Scenario, now: Scenario) -> bool:
     """Whether two scenarios differ, but in nothing that planning knows of."""
-    same = before.settings() == now.settings() and before.make_stop() == now.make_stop()
+    same = make_planner(before) == make_planner(now) and make_stop(before) == make_stop(now)
     return same and before != now
 
 

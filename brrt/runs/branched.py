@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from brrt.events import Status
+from brrt.planners import make_planner, make_stop, state_contract
+from brrt.planners.base.problem import Problem
 from brrt.recording import check_limits
 from brrt.runs import branch
 from brrt.runs.branch import Recorded
@@ -23,9 +25,7 @@ class _Again(Run):
     def _set_up_again(
         self, manifest: Manifest, scenario: Scenario, world: World, planner: Solver, batch: int
     ) -> None:
-        query = replace(scenario, start=manifest.start, goal=manifest.goal)
-        problem = query.make_problem(world, manifest.make_robot())
-        self._set_up(scenario, problem, planner, batch)
+        self._set_up(scenario, Problem.recorded(manifest, world), planner, batch)
         # The first stretch's seed: a branch may have changed it since.
         first = manifest.stretches[0][1].seed
         self._rng = np.random.Generator(np.random.PCG64(first))
@@ -90,6 +90,7 @@ class BranchedRun(_Again):
             events=shared.events,
             scenario=before.scenario,
             seed=seed,
+            contract=before.contract or state_contract(parent, self.problem),
         )
         # The clock goes on from the branch, so it is this run's own that is right from there on.
         epoch = self.manifest.epoch_ns - (0 if scenario.clock == "logical" else shared.t)
@@ -114,8 +115,14 @@ class RepeatedRun(_Again):
         self, manifest: Manifest, world: World, *, draws: int | None = None, batch: int = 8192
     ) -> None:
         own = manifest.scenario
-        scenario = own if draws is None else own.with_stop_at(draws)
-        self._set_up_again(manifest, scenario, world, scenario.make_planner(), batch)
+        scenario = own if draws is None else with_stop_at(own, draws)
+        self._set_up_again(manifest, scenario, world, make_planner(scenario), batch)
         if manifest.branches:
             self._planner = Anew(replace(manifest, scenario=scenario))
             self.manifest = replace(self.manifest, branches=manifest.branches)
+
+
+def with_stop_at(scenario: Scenario, iteration: int) -> Scenario:
+    """Return the scenario of a run that ends at an iteration, where the clock ended the first."""
+    most = make_stop(scenario).iterations
+    return replace(scenario, draws=max(1, iteration), iterations=most, time=None)

@@ -13,9 +13,11 @@ import numpy as np
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind
 from brrt.kernels.emit import EventLog
-from brrt.planners import PLANNERS
+from brrt.planners import PLANNERS, check_params, make_planner, make_stop, state_contract
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
+from brrt.planners.postprocessing.execute import Execute
+from brrt.planners.postprocessing.shortcut import Shortcut
 from brrt.recording import Memory, Recording, Result, Sink
 from brrt.replay.metrics import Metrics
 from brrt.scenario.manifest import Manifest
@@ -66,18 +68,20 @@ class Run:
         if planner is not None:
             scenario = _named(scenario, planner)
             self._stranger = type(planner) not in PLANNERS.values()
-        solver = scenario.make_planner() if planner is None else planner
-        self._set_up(scenario, scenario.make_problem(world), solver, batch)
+        solver = make_planner(scenario) if planner is None else planner
+        self._set_up(scenario, Problem.of(scenario, world), solver, batch)
 
     def _set_up(self, scenario: Scenario, problem: Problem, planner: Solver, batch: int) -> None:
         """Make ready all that `events` needs."""
+        scenario = check_params(scenario)
         self._planner, self.problem = planner, problem
-        self._smoother, self._execute = scenario.make_smoother(), scenario.make_execute()
+        self._smoother = Shortcut(attempts=scenario.shortcuts) if scenario.smooth else None
+        self._execute = Execute(max_move=scenario.max_move) if scenario.execute else None
         self._compile()
         self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
         self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
         self._gone = False
-        self.stop = scenario.make_stop()
+        self.stop = make_stop(scenario)
         self.manifest = Manifest(
             scenario=scenario,
             start=tuple(problem.start.tolist()),
@@ -87,6 +91,7 @@ class Run:
             epoch_ns=self._log.epoch_ns,
             made_by=made_by(),
             robot=problem.robot.to_json(),
+            contract=state_contract(planner, problem),
         )
 
     def _compile(self) -> None:

@@ -1,29 +1,29 @@
-"""What a recording says about the run that made it, written before the first event."""
+"""What a recording states about the run that made it, written before the first event."""
 
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 from brrt.errors import BrrtError
-from brrt.planners.base.problem import Problem
 from brrt.robots import Robot, robot_from_json
+from brrt.scenario.contract import Contract
 from brrt.scenario.scenario import Scenario
-from brrt.worlds.world import World
 
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Where a run went on from a recorded one with other settings.
+    """Where a run continued a recorded one with other settings.
 
     Attributes:
         parent: Digest of the recorded run's manifest; see `Manifest.digest`.
-        file: Name of its file; empty where it had none.
+        file: Name of its file; empty for a run in memory.
         iteration: The last iteration that both share.
         events: How many events both share; the first of the run's own has this number.
-        scenario: What ruled up to there.
-        seed: Seed of the draws from there on; None where the generator simply went on.
+        scenario: The settings up to there.
+        seed: Seed of the draws from there on; None to continue the generator.
+        contract: The contract up to there; None if none is stated.
     """
 
     parent: str
@@ -32,79 +32,50 @@ class Branch:
     events: int
     scenario: Scenario
     seed: int | None = None
+    contract: Contract | None = None
 
     @property
     def origin(self) -> str:
-        """What it went on from, and where: a file's name as it was then."""
+        """What the run continued, and where: a file by its name at that time."""
         return f"{self.file or 'a run in memory'} at iteration {self.iteration:,}"
 
-    def told(self, after: Scenario) -> str:
-        """Say what is otherwise from here on, where another scenario rules."""
-        before, now = ({**s.as_dict(), **s.settings()} for s in (self.scenario, after))
-        names = now.keys() - {"params", "seed", "start", "goal", "draws"}
-        changed = [name for name in sorted(names) if now[name] != before.get(name)]
-        parts = [f"{name} {_said(now[name])}, was {_said(before.get(name))}" for name in changed]
-        parts += [] if self.seed is None else [f"draws from seed {self.seed}"]
-        return "; ".join(parts) or "all as before"
+    def as_dict(self) -> dict[str, Any]:
+        """Return what `parse` takes; the contract is left out."""
+        found = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "contract"}
+        return {**found, "scenario": self.scenario.as_dict()}
 
     @classmethod
-    def parse(cls, values: Mapping[str, Any]) -> Self:
-        """Read what `dataclasses.asdict` made of one.
+    def parse(cls, values: Mapping[str, Any], contract: Contract | None = None) -> Self:
+        """Read what `as_dict` returned.
 
         Raises:
             KeyError: A field is missing.
-            TypeError: There is one too many.
-            ValueError: A number is none, or below 0.
+            TypeError: A field is unknown.
+            ValueError: A number is malformed, or below 0.
         """
         known = {**values, "scenario": Scenario.parse(values["scenario"])}
         known |= {name: int(values[name]) for name in ("iteration", "events")}
         if min(known["iteration"], known["events"]) < 0:
             raise ValueError("a branch before the beginning")
-        return cls(**known)
-
-
-def _json(text: str) -> Any:
-    """Read JSON as it is defined, which knows no NaN and no infinity: no setting is either."""
-    return json.loads(text, parse_constant=_refused)
-
-
-def _refused(constant: str) -> None:
-    raise ValueError(f"{constant} is no number")
-
-
-def _scenario(text: str) -> Scenario:
-    """Read a scenario that names what was run: what is missing would be taken for the usual."""
-    values = _json(text)
-    scenario = Scenario.parse(values)
-    for name in ("world", "planner"):
-        if name not in values:
-            raise BrrtError(f"the manifest is damaged: its scenario has no {name}")
-    return scenario
-
-
-def _said(value: Any) -> str:
-    """Write a setting; where it is not given, the run decides."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return "auto" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+        return cls(**known, contract=contract)
 
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """What a recording says about the run that made it, written before the first event.
+    """What a recording states about the run that made it, written before the first event.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; of a run with branches, from the last of them on.
         start: First configuration, as resolved.
         goal: Last configuration, as resolved.
         dim: 2 or 3, the world's dimension.
         dof: Numbers in a configuration.
         epoch_ns: Wall clock (ns since 1970) at time 0 of the events.
-        made_by: Versions of brrt and of what it stands on, and the platform.
-        robot: The robot's definition in JSON, settled in the world; None in recordings that were
-            made before there were robots to define.
-        branches: Where the settings changed, in order, for a run that goes on from a recorded one;
-            the scenario is what rules from the last of them on.
+        made_by: Versions of brrt and of its dependencies, and the platform.
+        robot: The robot's definition in JSON, resolved in the world; None in recordings made
+            before robots were recorded.
+        branches: Where the settings changed, in order, for a run that continues a recorded one.
+        contract: What the planner promises, by the settings of `scenario`; None if not stated.
     """
 
     scenario: Scenario
@@ -116,59 +87,52 @@ class Manifest:
     made_by: Mapping[str, str]
     robot: str | None = None
     branches: tuple[Branch, ...] = ()
+    contract: Contract | None = None
 
     FORMAT, BRANCHED = "1", "2"
-    """A run that changed its settings on the way is of a format of its own: who does not know of
-    that would hold all of it to the last settings."""
+    """Runs with branches have a format of their own: a reader that does not know them would apply
+    the last settings to the whole run."""
 
     @property
     def stretches(self) -> tuple[tuple[int, Scenario], ...]:
-        """The number of the event that each scenario rules from, and the scenario, in order."""
+        """For each scenario, in order, the number of the first event that it rules."""
         firsts = (0, *(branch.events for branch in self.branches))
         scenarios = (*(branch.scenario for branch in self.branches), self.scenario)
         return tuple(zip(firsts, scenarios, strict=True))
 
     @property
-    def origins(self) -> tuple[str, ...]:
-        """From what the run went on, where, and what changed there; for each branch, in order."""
-        after = (scenario for _, scenario in self.stretches[1:])
-        return tuple(
-            f"{branch.origin}: {branch.told(scenario)}"
-            for branch, scenario in zip(self.branches, after, strict=True)
-        )
+    def contracts(self) -> tuple[Contract | None, ...]:
+        """The contract stated for each of the `stretches`; None where none is."""
+        return (*(branch.contract for branch in self.branches), self.contract)
 
     def ruling(self, iteration: int) -> Self:
-        """Return what it would be without the branches that came after an iteration."""
+        """Return the manifest without the branches after an iteration."""
         kept = tuple(b for b in self.branches if b.iteration <= iteration)
-        later = self.branches[len(kept) :]
-        return replace(self, branches=kept, scenario=later[0].scenario if later else self.scenario)
+        last = self.branches[len(kept)] if len(kept) < len(self.branches) else self
+        return replace(self, branches=kept, scenario=last.scenario, contract=last.contract)
 
     def digest(self) -> str:
-        """Return a name for the run: the same where everything is, the clock included."""
+        """Return an identifier of the run: equal where everything is, the clock included."""
         return hashlib.sha256(json.dumps(self.to_strings()).encode()).hexdigest()
 
     def make_robot(self) -> Robot:
-        """Make the robot that the run was made with, even where its file is gone.
+        """Make the recorded robot; its file need not exist.
 
         Raises:
             BrrtError: Its definition is damaged.
         """
         return self.scenario.make_robot() if self.robot is None else robot_from_json(self.robot)
 
-    def make_problem(self, world: World) -> Problem:
-        """Put the recorded query and robot into the recorded world, even where files are gone.
-
-        Raises:
-            BrrtError: The query is of no use in the world, or the robot's definition is damaged.
-        """
-        query = replace(self.scenario, start=self.start, goal=self.goal)
-        return query.make_problem(world, self.make_robot())
-
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
         texts = {} if self.robot is None else {"robot": self.robot}
+        if self.contract is not None:
+            texts["contract"] = json.dumps(self.contract.as_dict())
         if self.branches:
-            texts["branches"] = json.dumps([asdict(branch) for branch in self.branches])
+            texts["branches"] = json.dumps([branch.as_dict() for branch in self.branches])
+            # Apart from the branches: older versions of brrt refuse unknown fields in these.
+            earlier = [None if c is None else c.as_dict() for c in self.contracts[:-1]]
+            texts["branch_contracts"] = json.dumps(earlier)
         return texts | {
             "format": self.BRANCHED if self.branches else self.FORMAT,
             "scenario": json.dumps(self.scenario.as_dict()),
@@ -201,9 +165,50 @@ class Manifest:
                 int(texts["epoch_ns"]),
                 dict(_json(texts["made_by"])),
                 texts.get("robot"),
-                tuple(map(Branch.parse, _json(texts.get("branches", "[]")))),
+                _branches(texts),
+                _contract(_json(texts.get("contract", "null"))),
             )
         except KeyError as error:
             raise BrrtError(f"the manifest is damaged: it has no {error}") from None
         except (ValueError, TypeError, RecursionError) as error:
             raise BrrtError(f"the manifest is damaged: {error!r}") from None
+
+
+def _json(text: str) -> Any:
+    """Read JSON by its definition, without NaN and Infinity: no setting has these values."""
+    return json.loads(text, parse_constant=_refused)
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"{constant} is no number")
+
+
+def _scenario(text: str) -> Scenario:
+    """Read a scenario; world and planner must be in it, since the defaults may be wrong."""
+    values = _json(text)
+    scenario = Scenario.parse(values)
+    for name in ("world", "planner"):
+        if name not in values:
+            raise BrrtError(f"the manifest is damaged: its scenario has no {name}")
+    return scenario
+
+
+def _branches(texts: Mapping[str, str]) -> tuple[Branch, ...]:
+    branches = _json(texts.get("branches", "[]"))
+    contracts = _json(texts.get("branch_contracts", "null")) or [None] * len(branches)
+    pairs = zip(branches, contracts, strict=True)
+    return tuple(Branch.parse(branch, _contract(contract)) for branch, contract in pairs)
+
+
+def _contract(values: Any) -> Contract | None:
+    """Read what `Contract.as_dict` returned.
+
+    Raises:
+        BrrtError: It is damaged, or has fields that this version does not know.
+    """
+    if values is None:
+        return None
+    try:
+        return Contract.from_dict(values)
+    except BrrtError as error:
+        raise BrrtError(f"the manifest is damaged: its contract: {error}") from None

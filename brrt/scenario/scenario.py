@@ -2,20 +2,15 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
-from brrt.planners import PLANNERS, Planner
-from brrt.planners.base.problem import Problem, random_configuration
-from brrt.planners.base.stop import Stop
-from brrt.planners.postprocessing.execute import Execute
-from brrt.planners.postprocessing.shortcut import Shortcut
 from brrt.robots import Robot, make_robot, names_robot_file
-from brrt.worlds import World, make_world, world_beside
+from brrt.worlds import world_beside
 
 RANDOM: Literal["random"] = "random"
 """A start or goal that the scenario's seed decides."""
@@ -23,8 +18,8 @@ RANDOM: Literal["random"] = "random"
 MOST = 10**15
 """Above any count that a run could reach, and well within 64 bits."""
 
-_NOWHERE = np.full(3, np.nan)
-"""Stands for a configuration until it is drawn: robots that stand somewhere still say where."""
+DEFAULT_ITERATIONS = 1_000_000
+"""Iterations of a run without a budget, unless its planner has another default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +83,6 @@ class Scenario:
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
         self._check_numbers()
-        # A recording of a planner that is not known here can be read all the same.
-        if self.planner in PLANNERS:
-            settings = self.settings()
-            given = {name: settings[name] for name in self.params}
-            object.__setattr__(self, "params", given)
 
     def _check_numbers(self) -> None:
         _whole("seed", self.seed, low=0)
@@ -154,41 +144,14 @@ class Scenario:
         """Names and values, as `parse` takes them."""
         return asdict(self)
 
-    def with_stop_at(self, iterations: int) -> "Scenario":
-        """Return the scenario of a run that the clock or a person cut, ended at that iteration."""
-        most = self.make_stop().iterations
-        return replace(self, draws=max(1, iterations), iterations=most, time=None)
+    def iteration_limit(self, default: int = DEFAULT_ITERATIONS) -> int:
+        """Return how many iterations the planner may make; `MOST` where only time is limited.
 
-    def make_planner(self) -> Planner:
-        """Make the planner with its settings.
-
-        Raises:
-            BrrtError: There is no such planner here.
+        Args:
+            default: The planner's own limit, for runs without a budget.
         """
-        if self.planner not in PLANNERS:
-            raise unknown("planner", self.planner, PLANNERS)
-        return PLANNERS[self.planner].parse(f"planner {self.planner}", self.params)
-
-    def settings(self) -> dict[str, Any]:
-        """All settings of the planner; of one that is not known here, those that were given."""
-        if self.planner not in PLANNERS:
-            return dict(self.params)
-        return self.make_planner().as_dict()
-
-    def make_smoother(self) -> Shortcut | None:
-        """Make the smoother, if there is to be one."""
-        return Shortcut(attempts=self.shortcuts) if self.smooth else None
-
-    def make_execute(self) -> Execute | None:
-        """Make the real-time mode, if there is to be one."""
-        return Execute(max_move=self.max_move) if self.execute else None
-
-    def make_stop(self) -> Stop:
-        """Make the budget."""
-        planner = PLANNERS.get(self.planner, Planner)
-        usual = MOST if self.time is not None else planner.default_iterations
-        iterations = usual if self.iterations is None else self.iterations
-        return Stop(iterations=iterations, draws=self.draws, time_s=self.time)
+        usual = MOST if self.time is not None else default
+        return usual if self.iterations is None else self.iterations
 
     def make_robot(self) -> Robot:
         """Make the robot.
@@ -197,39 +160,6 @@ class Scenario:
             BrrtError: Its file cannot be read or is not a robot.
         """
         return make_robot(self.robot)
-
-    def make_problem(self, world: World | None = None, robot: Robot | None = None) -> Problem:
-        """Make the world and the robot, unless they are at hand, and put the query into them.
-
-        A random start or goal is drawn in the world as it is: a generator keeps its corners free
-        and not the places that are drawn later, so that each seed has its query in one world.
-
-        Raises:
-            BrrtError: World or robot cannot be made, or start or goal is missing or of no use.
-        """
-        robot = self.make_robot() if robot is None else robot
-        given = (self.start, self.goal)
-        ends = [q if q is None else _NOWHERE if isinstance(q, str) else np.array(q) for q in given]
-        if world is None:
-            first, last = (None if q is None else robot.position(q) for q in ends)
-            world = make_world(self.world, first, last, robot.reach)
-        for place, name in enumerate(("start", "goal")):
-            if isinstance(given[place], str):
-                rng = np.random.Generator(np.random.PCG64([self.seed, place + 1]))
-                ends[place] = random_configuration(name, robot.resolved(world), world, rng)
-        start, goal = (
-            given if given is not None or own is None else robot.configuration(own)
-            for given, own in zip(ends, (world.start, world.goal), strict=True)
-        )
-        for name, q in (("start", start), ("goal", goal)):
-            if q is None:
-                example = ",".join(robot.coordinates(world))
-                raise BrrtError(
-                    f"world {self.world} has no {name} of its own for the robot {self.robot}; "
-                    f"give --{name} {example}"
-                )
-        assert start is not None and goal is not None  # noqa: S101, PT018 - told apart above
-        return Problem(world, robot, start, goal)
 
 
 def _robot(spec: str) -> str:

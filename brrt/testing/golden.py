@@ -10,7 +10,7 @@ from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.files import replacing
 from brrt.formats import McapSink, read
-from brrt.planners import PLANNERS
+from brrt.planners import PLANNERS, load_scenario
 from brrt.recording import Memory, Recording
 from brrt.replay.metrics import Metrics, metrics
 from brrt.runs.branched import RepeatedRun
@@ -36,7 +36,7 @@ def fresh(source: Source) -> Recording:
     given: Any = source
     if isinstance(given, Path | str):
         path = Path(given)
-        given = Scenario.load(path) if path.suffix == ".toml" else read(path)
+        given = load_scenario(path) if path.suffix == ".toml" else read(path)
     if isinstance(given, Scenario):
         _check_budget(given)
         given = Run(replace(given, clock="logical"))

@@ -63,8 +63,8 @@ def examine(
         manifest: The run's.
         world: The run's.
         events: The whole log, at once or in batches, in order.
-        contract: What the planner promises; by default what the registered one of that name does,
-            and of one that is not known here only what all planners do.
+        contract: What the planner promises; by default what the recording states, or else the
+            registered planner of that name; without either only what all planners promise.
         cut: Whether the log breaks off, or what says so once it was read; what is promised of the
             end is then left out.
         figures: Those that stand at the recording's end, under the names of `Metrics`.

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
-from brrt.planners import PLANNERS
 from brrt.replay.ledger import (
     NONE,
     Changes,
@@ -22,7 +21,9 @@ from brrt.replay.ledger import (
     sum_up,
 )
 from brrt.scenario.contract import Contract
+from brrt.scenario.contracts import contracts_of
 from brrt.scenario.manifest import Manifest
+from brrt.scenario.query import Query
 from brrt.verification.collision.motions import Obstacles, first_hits
 from brrt.verification.result import RuleResult
 from brrt.verification.retention import Kept
@@ -109,7 +110,7 @@ class Context:
         contract: What the planner promises, by the settings that it ended with.
         stretches: The number of the event that each contract rules from, and the contract: more
             than one where a run went on from a recorded one with other settings.
-        known: Whether the planner is known here, so that there is a contract.
+        known: Whether there is a contract.
         breaks_off: Says, once the log was read, whether it breaks off.
         figures: What stands at the recording's end, under the names of `Metrics`; None where
             nothing does.
@@ -143,25 +144,23 @@ class Context:
         Args:
             manifest: The run's.
             world: The run's.
-            contract: What the planner promises; by default what the registered one does.
+            contract: What the planner promises; by default what the recording states.
             breaks_off: Says, once the log was read, whether it breaks off.
             figures: What stands at the recording's end.
 
         Raises:
             BrrtError: Its query is of no use in its world.
         """
-        problem = manifest.make_problem(world)
-        known = contract is not None or manifest.scenario.planner in PLANNERS
-        stretches: tuple[tuple[int, Contract], ...] = ((0, contract or Contract()),)
-        if contract is None and known:
-            stretches = tuple(
-                (first, ruling.make_planner().contract(problem))
-                for first, ruling in manifest.stretches
-            )
-        bounds = problem.robot.bounds(world)
+        query = Query.recorded(manifest, world)
+        stated = contracts_of(manifest, world) if contract is None else (contract,)
+        stretches = tuple(
+            (first, each or Contract())
+            for (first, _), each in zip(manifest.stretches, stated, strict=False)
+        )
         return cls(
-            manifest, world, Kept(manifest.dof, stretches[-1][1]), problem.robot, problem.start,
-            problem.goal, *bounds, stretches[-1][1], stretches, known, breaks_off, figures,
+            manifest, world, Kept(manifest.dof, stretches[-1][1]), query.robot, query.start,
+            query.goal, query.lower, query.upper, stretches[-1][1], stretches,
+            stated[-1] is not None, breaks_off, figures,
         )  # fmt: skip
 
     @cached_property

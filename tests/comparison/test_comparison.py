@@ -18,6 +18,7 @@ from brrt import (
     Manifest,
     McapSink,
     Memory,
+    Problem,
     Recording,
     Run,
     Scenario,
@@ -36,7 +37,7 @@ OTHER = replace(SCENARIO, params={"step": 1.5})
 
 def unplanned(scenario: Scenario) -> Recording:
     """Return a run without events; nothing is compiled for it."""
-    problem = scenario.make_problem()
+    problem = Problem.of(scenario)
     start, goal = (tuple(q.tolist()) for q in (problem.start, problem.goal))
     manifest = Manifest(scenario, start, goal, 2, problem.dof, 0, {}, problem.robot.to_json())
     return Recording(manifest, problem.world, list)

@@ -186,13 +186,14 @@ def test_a_recording_is_explained_at_its_end() -> None:
 
 
 def test_a_planner_from_outside_is_explained() -> None:
-    """One that is not known here has no settings to advise on."""
+    """By the contract that it states; no command could plan it again."""
     scenario = Scenario(world="circles2d:n=10,seed=2", planner="toy", iterations=60)
     run, log = Run(scenario, planner=toys.Pair()), Memory()
     run.execute([log])
     whole = Recording(run.manifest, run.problem.world, lambda: iter(log.batches), None)
     found = explain(snapshot(whole, iteration=2))
-    assert found.facts.contract is None
+    assert found.facts.contract.step == toys.STEP
+    assert not found.facts.contract.planner.registered
     assert found.facts.gap is not None
     a, b = found.facts.gap.q, found.facts.gap.other
     assert found.facts.gap.far == np.linalg.norm(np.subtract(a, b))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
+from brrt.planners import make_planner
 from brrt.planners.bi_rrt import BiRRT
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
@@ -46,7 +47,7 @@ def walled(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def settings_of(run: Run) -> dict[str, Any]:
     """The planner's settings, those of `rrt-connect` as the variant that it stands for."""
-    planner = run.manifest.scenario.make_planner()
+    planner = make_planner(run.manifest.scenario)
     given = planner.as_dict()
     usual = BiRRT(link="connect" if run.manifest.scenario.planner == "rrt-connect" else "extend")
     return {**usual.as_dict(), **given, "step": planner.contract(run.problem).step}

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
+from brrt.planners import make_planner
+from brrt.runs.branched import with_stop_at
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 from brrt.worlds import World
@@ -73,7 +75,7 @@ def check_tree(run: Run, events: Events) -> None:
     world, edges, options = (
         run.problem.world,
         events[Kind.EDGE],
-        run.manifest.scenario.make_planner(),
+        make_planner(run.manifest.scenario),
     )
     settings = options.as_dict()
     step = settings["step"] or 0.05 * world.extent
@@ -115,7 +117,7 @@ def check_samples(run: Run, events: Events) -> None:
 
 def check_extensions(run: Run, events: Events) -> None:
     """Each sample steers from a nearest node by at most a step: to a node, or to a rejection."""
-    world, options = run.problem.world, run.manifest.scenario.make_planner().as_dict()
+    world, options = run.problem.world, make_planner(run.manifest.scenario).as_dict()
     step, edges = options["step"] or 0.05 * world.extent, events[Kind.EDGE]
     slices = options["slices"] if options["keep_intermediate"] else 1
     rejects = events[Kind.REJECT]
@@ -153,7 +155,7 @@ def check_extensions(run: Run, events: Events) -> None:
 
 def check_goal_tests(run: Run, events: Events) -> None:
     """The goal test is made for each vector's end that it applies to: a join, or a refusal."""
-    options = run.manifest.scenario.make_planner().as_dict()
+    options = make_planner(run.manifest.scenario).as_dict()
     edges, rejects = events[Kind.EDGE], events[Kind.REJECT]
     refused = rejects["node"][rejects["reason"] == Reason.GOAL_BLOCKED]
     step = options["step"] or 0.05 * run.problem.world.extent
@@ -192,7 +194,7 @@ def check_phases(run: Run, events: Events) -> None:
     assert phases["seq"].tolist() == [0, len(events) - 1]
     scenario = run.manifest.scenario
     counted = len(events[Kind.SAMPLE])
-    if not scenario.make_planner().as_dict()["count_failed"]:
+    if not make_planner(scenario).as_dict()["count_failed"]:
         counted = len(np.setdiff1d(events[Kind.EDGE]["iteration"], [0]))
     assert counted <= run.stop.iterations
     if status(events) is Status.ITERATION_LIMIT:
@@ -260,7 +262,7 @@ def test_the_last_iteration_may_solve(params: dict[str, Any]) -> None:
     run, whole = planned(ample)
     check_all(run, whole)
     needed = len(whole[Kind.SAMPLE])
-    if not ample.make_planner().as_dict()["count_failed"]:
+    if not make_planner(ample).as_dict()["count_failed"]:
         needed = len(np.setdiff1d(whole[Kind.EDGE]["iteration"], [0]))
     exact = replace(ample, iterations=needed)
     naive.assert_same(whole, planned(exact)[1])
@@ -468,7 +470,7 @@ def test_an_interrupted_run_is_the_beginning_of_the_whole(batch: int, seed: int,
     check_log(log)
     if status(log) is Status.INTERRUPTED:
         if len(log[Kind.SAMPLE]):
-            again = planned(scenario.with_stop_at(len(log[Kind.SAMPLE])))[1]
+            again = planned(with_stop_at(scenario, len(log[Kind.SAMPLE])))[1]
             for events in (log, again):
                 events[Kind.PHASE]["status"][-1] = Status.INTERRUPTED
             naive.assert_same(log, again)

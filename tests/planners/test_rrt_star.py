@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
 from brrt.kernels.jit import config
-from brrt.planners import Contract
+from brrt.planners import Contract, make_planner
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 from tests.planners.test_rrt import (
@@ -46,7 +46,7 @@ optimality = benchmark("optimality")
 
 def promise(run: Run) -> Contract:
     """What the planner says that it can be held to."""
-    return run.manifest.scenario.make_planner().contract(run.problem)
+    return make_planner(run.manifest.scenario).contract(run.problem)
 
 
 def is_double(run: Run) -> bool:
@@ -165,7 +165,7 @@ def check_all(run: Run, events: Events) -> None:
     rows = sorted((int(event["seq"]), kind, event) for kind in names for event in events[kind])
     for _, kind, event in rows:
         getattr(fold, kind.label)(event)
-    if run.manifest.scenario.make_planner().as_dict()["stop_at_first"]:
+    if make_planner(run.manifest.scenario).as_dict()["stop_at_first"]:
         assert (status(events) is Status.SOLVED) == (len(events[Kind.PATH]) == 1)
     else:
         assert status(events) is Status.ITERATION_LIMIT
@@ -178,7 +178,7 @@ def check_all(run: Run, events: Events) -> None:
 def check_samples(run: Run, events: Events) -> None:
     """One sample an iteration, in bounds; where informed, only where a better path may lead."""
     problem, samples, paths = run.problem, events[Kind.SAMPLE], events[Kind.PATH]
-    informed = run.manifest.scenario.make_planner().as_dict()["informed"]
+    informed = make_planner(run.manifest.scenario).as_dict()["informed"]
     q, source = samples["q"], samples["source"]
     assert (samples["iteration"] == 1 + np.arange(len(samples))).all()
     assert (samples["tree"] == np.arange(len(samples)) % (1 + is_double(run))).all()
@@ -203,7 +203,7 @@ def twin_of(run: Run) -> list[twins.Event]:
     """What the slow twin says in the same run."""
     scenario, near = run.manifest.scenario, promise(run).near
     assert near is not None
-    settings = scenario.make_planner().as_dict()
+    settings = make_planner(scenario).as_dict()
     twin = TWINS[scenario.planner](run.problem, scenario.seed, settings, near)
     return twin.run(run.stop.iterations)
 

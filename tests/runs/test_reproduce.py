@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from brrt import BrrtError, Events, Kind, McapSink, Run, Scenario, World, plan_again, read
 from brrt.events import Phase, Status
+from brrt.planners import make_stop
+from brrt.runs.branched import with_stop_at
 from brrt.runs.reproduce import Again
 from tests.conftest import Result, recorded, result_of
 from tests.support.logs import split
@@ -204,7 +206,7 @@ def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: 
 def test_a_stop_beyond_the_default() -> None:
     """A run that made more iterations in its time than it makes by default ends where it did."""
     scenario = replace(PLAIN, time=5.0)
-    stop = scenario.with_stop_at(3_000_000).make_stop()
+    stop = make_stop(with_stop_at(scenario, 3_000_000))
     assert stop.draws == 3_000_000
     assert stop.iterations > 3_000_000
     assert stop.time_s is None

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brrt import BrrtError, Kind, Memory, Run, Scenario, check, make_robot
+from brrt import BrrtError, Kind, Memory, Problem, Run, Scenario, check, make_robot
 from tests.conftest import Result
 
 ROBOTS = {
@@ -32,7 +32,7 @@ def test_both_are_free_and_the_seed_decides(robot: str) -> None:
     """The same seed gives the same query; ten seeds give ten of each, all of them free."""
     drawn = []
     for seed in range(10):
-        problem, again = (scenario(robot, seed).make_problem() for _ in range(2))
+        problem, again = (Problem.of(scenario(robot, seed)) for _ in range(2))
         for q, same in ((problem.start, again.start), (problem.goal, again.goal)):
             assert problem.robot.collision(problem.world, q) is None
             assert q.tolist() == same.tolist()
@@ -43,25 +43,25 @@ def test_both_are_free_and_the_seed_decides(robot: str) -> None:
 def test_they_spread_evenly() -> None:
     """In an empty world the draws fill each quarter of the map alike."""
     base = Scenario(world="circles2d:n=0", start="random")
-    world = base.make_problem().world
-    many = [replace(base, seed=seed).make_problem(world).start > 50 for seed in range(400)]
+    world = Problem.of(base).world
+    many = [Problem.of(replace(base, seed=seed), world).start > 50 for seed in range(400)]
     quarters = np.array(many) @ [1, 2]
     assert np.bincount(quarters, minlength=4).min() > 70
 
 
 def test_each_has_a_stream_of_its_own() -> None:
     """Neither moves the other, the world, or what the planner draws."""
-    both = scenario("point").make_problem()
+    both = Problem.of(scenario("point"))
     start, goal = tuple(both.start.tolist()), tuple(both.goal.tolist())
     one = replace(scenario("point"), goal=goal)
     other = replace(scenario("point"), start=start)
     logs = []
     for each in (scenario("point"), one, other, replace(one, start=start)):
-        problem = each.make_problem(both.world)
+        problem = Problem.of(each, both.world)
         assert (problem.start == both.start).all()
         assert (problem.goal == both.goal).all()
     plain = Scenario(world=ROBOTS["point"], planner="rrt-connect")
-    assert plain.make_problem().world.to_json() == both.world.to_json()
+    assert Problem.of(plain).world.to_json() == both.world.to_json()
     for each in (scenario("point"), replace(scenario("point"), start=start, goal=goal)):
         # A given query has its places kept free, so it may not meet the same world.
         memory = Memory()
@@ -104,7 +104,7 @@ def test_no_room_is_one_line() -> None:
         goal="random",
     )
     with pytest.raises(BrrtError, match="none of 10,000 random configurations for the start"):
-        full.make_problem()
+        Problem.of(full)
     with pytest.raises(BrrtError, match="goal must be numbers like 1,2, or random, and not 'rand'"):
         Scenario(goal="rand")  # type: ignore[arg-type]
 
@@ -113,12 +113,14 @@ def test_a_chain_keeps_its_base_free() -> None:
     """Obstacles would otherwise stand on it for good, whatever is drawn."""
     robot = make_robot("chain:base_x=20,base_y=20")
     for seed in range(5):
-        problem = Scenario(
-            world=f"circles2d:n=150,max_radius=4,seed={seed}",
-            robot="chain:base_x=20,base_y=20,length=2",
-            start="random",
-            goal="random",
-        ).make_problem()
+        problem = Problem.of(
+            Scenario(
+                world=f"circles2d:n=150,max_radius=4,seed={seed}",
+                robot="chain:base_x=20,base_y=20,length=2",
+                start="random",
+                goal="random",
+            )
+        )
         position = robot.position(problem.start)
         assert position is not None
         assert problem.world.obstacle_at(position) is None

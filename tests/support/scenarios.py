@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt import BrrtError, Robot, Scenario, World, make_robot, make_world
+from brrt import BrrtError, Problem, Robot, Scenario, World, make_robot, make_world
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def _attempt(rng: np.random.Generator, folder: Path, planner: str, kind: str) ->
     )  # fmt: skip
     try:
         # Obstacles make way for start and goal, and may come to lie where these were free.
-        scenario.make_problem()
+        Problem.of(scenario)
     except BrrtError:
         return None
     return scenario

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import Events, Kind, make_robot, verification
+from brrt import Events, Kind, Problem, make_robot, verification
 from brrt.events import Reason
+from brrt.planners import make_planner
 from brrt.verification import examine
 from brrt.verification.neighbours import Neighbours, nearest
 from tests.verification.test_rules import Evidence, evidence, promise
@@ -20,8 +21,8 @@ def growing(**fields: object) -> Callable[[Evidence], Evidence]:
     """Another way of growing in the contract."""
 
     def change(case: Evidence) -> Evidence:
-        base = case.manifest.scenario.make_planner().contract(
-            case.manifest.scenario.make_problem(case.world)
+        base = make_planner(case.manifest.scenario).contract(
+            Problem.of(case.manifest.scenario, case.world)
         )
         assert base.growth is not None
         return promise(growth=replace(base.growth, **fields))(case)  # type: ignore[arg-type]

@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import Events, Kind, Manifest, McapSink, Memory, Run, Scenario, World, check
+from brrt import Events, Kind, Manifest, McapSink, Memory, Problem, Run, Scenario, World, check
 from brrt.events import Phase, Reason, Status, table_dtype
+from brrt.planners import make_planner
 from brrt.replay.metrics import Metrics
 from brrt.scenario.contract import Contract, Near
 from brrt.verification import RULES, examine
@@ -254,8 +255,8 @@ def promise(**fields: Any) -> Callable[[Evidence], Evidence]:
     """Another contract."""
 
     def change(case: Evidence) -> Evidence:
-        base = case.contract or case.manifest.scenario.make_planner().contract(
-            case.manifest.scenario.make_problem(case.world)
+        base = case.contract or make_planner(case.manifest.scenario).contract(
+            Problem.of(case.manifest.scenario, case.world)
         )
         return replace(case, contract=replace(base, **fields))
 

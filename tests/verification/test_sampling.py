@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from brrt import Events, Kind, Memory, Run, Scenario, World
 from brrt.events import Phase, Source, Status, table_dtype
+from brrt.planners import make_planner
 from brrt.scenario.contract import Draws
 from brrt.verification import examine
 from brrt.verification.e_process import (
@@ -57,7 +58,7 @@ def log_of(n: int, doctor: Doctor | None = None, seed: int = 0) -> Evidence:
     for table in tables.values():
         table["t"] = table["seq"] * 1000
     # What came of the draws is left out, so nothing is promised of that.
-    contract = replace(scenario.make_planner().contract(run.problem), growth=None)
+    contract = replace(make_planner(scenario).contract(run.problem), growth=None)
     return Evidence(run.manifest, run.problem.world, Events(2, tables), contract)
 
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from brrt import Kind
+from brrt import Kind, Problem
 from brrt.events import Status
+from brrt.planners import make_planner
 from brrt.verification import examine
 from tests.verification.test_rules import Evidence, evidence, promise
 from tests.verification.test_sampling import run_of
@@ -49,8 +50,8 @@ def given_up(case: Evidence) -> Evidence:
 
 def longer_arm(case: Evidence) -> Evidence:
     """The goal would have been in reach much earlier."""
-    base = case.manifest.scenario.make_planner().contract(
-        case.manifest.scenario.make_problem(case.world)
+    base = make_planner(case.manifest.scenario).contract(
+        Problem.of(case.manifest.scenario, case.world)
     )
     assert base.lattice is not None
     return promise(lattice=replace(base.lattice, max_move=40.0))(case)

@@ -152,11 +152,9 @@ class KernelPlanner(Planner):
     """What plans by a compiled loop.
 
     Attributes:
-        settled: Settings that cannot be others on the way.
-        onward: How a run that ended with a path can go on; empty where none can.
+        resume_hint: How a run that ended with a path can go on; empty where none can.
     """
 
-    fixed_params: ClassVar[tuple[str, ...]] = ()
     resume_hint: ClassVar[str] = ""
 
     @abstractmethod

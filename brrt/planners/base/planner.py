@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,18 +12,36 @@ from brrt.kernels.emit import EventLog
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario.contract import Contract
+from brrt.scenario.query import Query
+from brrt.scenario.scenario import DEFAULT_ITERATIONS
 from brrt.settings import Settings
+
+
+@runtime_checkable
+class StatesContract(Protocol):
+    """What a planner that is no `Planner` may have beside `solve`."""
+
+    def contract(self, query: Query) -> Contract:
+        """See `Planner.contract`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Planner(Settings):
-    """Base class; a planner from outside may as well be any object with this method.
+    """Base class; any other object with the method `solve` is a planner too.
 
     Attributes:
-        default_iterations: Iterations that a run may make where no budget is given.
+        default_iterations: Limit of a run without a budget.
+        fixed_params: Settings that a branch cannot change.
+        bidirectional: The registered planner that grows a second tree, from the goal.
+        first_path: The registered planner that is cheaper and stops at the first path.
+        continuous: A registered planner that needs no lattice.
     """
 
-    default_iterations: ClassVar[int] = 1_000_000
+    default_iterations: ClassVar[int] = DEFAULT_ITERATIONS
+    fixed_params: ClassVar[tuple[str, ...]] = ()
+    bidirectional: ClassVar[str | None] = None
+    first_path: ClassVar[str | None] = None
+    continuous: ClassVar[str | None] = None
 
     @abstractmethod
     def solve(
@@ -38,6 +56,6 @@ class Planner(Settings):
             stop: Budget and interruption.
         """
 
-    def contract(self, problem: Problem) -> Contract:  # noqa: ARG002
-        """Say what a recording of this planner can be held to, beyond what all planners promise."""
+    def contract(self, query: Query) -> Contract:  # noqa: ARG002
+        """Return what this planner promises beyond what all planners do; see `Contract`."""
         return Contract()

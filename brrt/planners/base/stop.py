@@ -1,14 +1,11 @@
 """When to stop, as a value that the caller passes."""
 
 import math
-import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from types import FrameType
 
 from brrt.events import Status
+from brrt.scenario.scenario import DEFAULT_ITERATIONS
 
 _BRIEF_S, _LONG_S, _MOST_SHARE = 0.1, 0.4, 1 << 40
 
@@ -25,7 +22,7 @@ class Stop:
         signal: Number of the signal that set it; 0 if none did.
     """
 
-    iterations: int = 1_000_000
+    iterations: int = DEFAULT_ITERATIONS
     draws: int | None = None
     time_s: float | None = None
     interrupted: bool = False
@@ -56,33 +53,3 @@ class Stop:
             self._share = max(1, self._share // 2)
         left = self.iterations - iterations
         return min(left, self._share if self.time_s is None else min(self._share, 1024))
-
-
-@contextmanager
-def stop_on_signals(stop: Stop) -> Iterator[None]:
-    """Let a signal end the run properly instead of killing it; a second one kills."""
-
-    def raise_flag(number: int, _: FrameType | None) -> None:
-        if stop.interrupted:
-            raise KeyboardInterrupt
-        stop.interrupted, stop.signal = True, number
-
-    with handling_signals(raise_flag):
-        yield
-
-
-@contextmanager
-def handling_signals(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Let a handler take what asks a program to end: Ctrl-C, SIGTERM, and a terminal's closing.
-
-    The last of them is left alone where it is ignored, as under nohup.
-    """
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        numbers.append(signal.SIGHUP)
-    before = {number: signal.signal(number, handler) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)

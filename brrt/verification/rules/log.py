@@ -127,8 +127,8 @@ def outcome(context: Context, result: RuleResult) -> None:
 
 def _with_path(context: Context) -> set[Status]:
     """How planning may end where there is a path: who improves it, or tries again, has a budget."""
-    stretches = context.manifest.stretches
-    again = any(scenario.settings().get("trials", 1) > 1 for _, scenario in stretches)
+    lattices = [contract.lattice for _, contract in context.stretches]
+    again = any(lattice is not None and lattice.trials > 1 for lattice in lattices)
     if context.contract.near is None and context.known and not again:
         return {Status.SOLVED, Status.INTERRUPTED}
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
@@ -143,9 +143,10 @@ def _made(context: Context) -> int:
         *(branch.iteration for branch in context.manifest.branches),
         context.kept.last_iteration,
     ]
-    for end, (_, ruling) in zip(ends, context.manifest.stretches, strict=True):
+    for number, end in enumerate(ends):
         # Where failed draws do not count, only those that add a node do.
-        sparing = ruling.settings().get("count_failed") is False
+        growth = context.stretches[min(number, len(context.stretches) - 1)][1].growth
+        sparing = growth is not None and not growth.counts_failed
         made += int(((begin < adding) & (adding <= end)).sum()) if sparing else end - begin
         begin = end
     return made
@@ -216,7 +217,8 @@ def _not_done(context: Context, event: np.void) -> str | None:
 def _left(context: Context) -> str | None:
     """Say what was left of a budget of iterations."""
     scenario, draws = context.manifest.scenario, context.kept.last_iteration
-    limit, made = scenario.make_stop().iterations, _made(context)
+    limit = scenario.iteration_limit(context.contract.planner.default_iterations)
+    made = _made(context)
     spent = scenario.draws is not None and draws >= scenario.draws
     # Where failed draws do not count, their number has an end all the same.
     spent |= made < draws and draws >= 1000 * limit

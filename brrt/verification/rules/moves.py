@@ -94,7 +94,7 @@ def arrival(context: Context, result: RuleResult) -> None:
     table, phases = context.events[Kind.MOVE], context.events[Kind.PHASE]
     done = ((phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.DONE)).any()
     stopped = (phases["status"][-1:] == Status.INTERRUPTED).any()
-    solved = context.outcome is Status.SOLVED and (len(table) or _learns(context))
+    solved = context.outcome is Status.SOLVED and (len(table) or context.contract.learns)
     if context.cut or stopped or not (done or solved):
         return
     last = np.asarray(table["q"][-1]) if len(table) else context.start
@@ -102,17 +102,11 @@ def arrival(context: Context, result: RuleResult) -> None:
     result.one(event, None if there else f"the last move ends at {text(last)}, not at the goal")
 
 
-def _learns(context: Context) -> bool:
-    """Whether a robot moves while its search goes on."""
-    lattice = context.contract.lattice
-    return lattice is not None and lattice.lookahead is not None
-
-
 def paths_walked(context: Context, result: RuleResult) -> None:
     """Of a robot that learns as it goes, each trial is a path: where it went, told on arrival."""
-    if not _learns(context):
+    lattice, table = context.contract.lattice, context.events[Kind.MOVE]
+    if lattice is None or lattice.lookahead is None:
         return
-    table = context.events[Kind.MOVE]
     for trial, (event, path) in enumerate(context.found):
         mine = table[table["trial"] == trial]
         way = np.concatenate([context.start[None], np.asarray(mine["q"])])
@@ -127,9 +121,8 @@ def paths_walked(context: Context, result: RuleResult) -> None:
         untold[:1], np.ones(len(untold[:1]), bool),
         lambda i: f"trial {untold['trial'][i]} begins; {len(context.found)} before it arrived",
     )  # fmt: skip
-    trials = context.manifest.stretches[-1][1].settings().get("trials", 1)
-    if context.outcome is Status.SOLVED and len(context.found) < trials:
-        result.one(None, f"{len(context.found)} of {trials} trials arrived")
+    if context.outcome is Status.SOLVED and len(context.found) < lattice.trials:
+        result.one(None, f"{len(context.found)} of {lattice.trials} trials arrived")
 
 
 def moves_along_path(context: Context, result: RuleResult) -> None:

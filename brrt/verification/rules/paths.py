@@ -57,9 +57,9 @@ def paths_improve(context: Context, result: RuleResult) -> None:
 
     Of a robot that learns as it goes each trial's path is raw.
     """
-    lattice, before = context.contract.lattice, None
-    learns = lattice is not None and lattice.lookahead is not None
-    one = context.contract.stops is True or (lattice is not None and not learns)
+    contract, before = context.contract, None
+    learns = contract.learns
+    one = contract.stops is True or (contract.lattice is not None and not learns)
     for event, _ in context.found:
         cost, stage, wrong = float(event["cost"]), int(event["stage"]), None
         due = Stage.RAW if before is None or learns else Stage.IMPROVED

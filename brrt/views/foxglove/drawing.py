@@ -11,6 +11,7 @@ from brrt.errors import LogError
 from brrt.events import Events, Kind, Stage, Table
 from brrt.replay.forest import forest
 from brrt.replay.ledger import changes
+from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import Colour
 from brrt.views.foxglove.draw_world import (
@@ -137,13 +138,14 @@ class Drawing:
         """Show each cell that was expanded by its cost, or by the newest estimate of LRTA*."""
         if not len(self._events[Kind.EXPAND]) and not len(self._events[Kind.HEURISTIC]):
             return iter(())
-        settings, world = self._manifest.scenario.settings(), self._world
-        t, cell, q, values = self._known(learns="lookahead" in settings)
+        world = self._world
+        contract = contract_of(self._manifest, world)
+        t, cell, q, values = self._known(learns=contract.learns)
         ends = np.array([self._manifest.start, self._manifest.goal])
         packed = layout.heat(values / (values + (float(self._robot.distance(*ends)) or 1.0)))
         shifts = np.array([24, 16, 8, 0], np.uint32)
         colours = ((packed[:, None] >> shifts & 255) / 255).astype(np.float32)
-        edge = float(settings.get("epsilon", 0.0)) or _CELL * world.extent
+        edge = contract.epsilon or _CELL * world.extent
         edge *= _IN_PLANE if world.dim == 2 else _IN_SPACE
         size = (edge, edge, 1e-6 * world.extent if world.dim == 2 else edge)
         cubes = partial(Marker, Shape.CUBES, layout.TRACE, size, z=GROUND * world.extent)

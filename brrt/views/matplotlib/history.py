@@ -10,6 +10,7 @@ from brrt.errors import LogError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status
 from brrt.replay.forest import forest
 from brrt.replay.ledger import Changes, changes
+from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.worlds.world import World
 
@@ -75,6 +76,7 @@ class History:
     def __init__(self, record: Record) -> None:
         self._events, self._manifest = record.events, record.manifest
         self.robot = record.manifest.make_robot().resolved(record.world)
+        self.contract = contract_of(record.manifest, record.world)
         self._places: dict[int, Floats] = {}
         self._changes: dict[int, Changes] = {}
         for number, tree in forest(record.events).items():
@@ -97,7 +99,7 @@ class History:
     @property
     def learns(self) -> bool:
         """Whether the cells have estimates of the cost-to-go, and not costs from the start."""
-        return "lookahead" in self._manifest.scenario.settings()
+        return self.contract.learns
 
     @property
     def last(self) -> int:

@@ -201,7 +201,7 @@ class TreePanel:
 
     @property
     def _edge(self) -> float:
-        return float(self._record.manifest.scenario.settings().get("epsilon", 1.0))
+        return self.history.contract.epsilon or 1.0
 
     @property
     def heat(self) -> tuple[Any, str] | None:

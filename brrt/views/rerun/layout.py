@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Stage
 from brrt.robots import Robot
+from brrt.scenario.contracts import changes_of, planner_settings
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
 from brrt.views.colours import GOAL, START, Colour
@@ -130,7 +131,7 @@ def log_scene(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None
 def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> str:
     """Describe the run in Markdown; with its figures once it is over."""
     scenario = manifest.scenario
-    settings = scenario.settings()
+    settings = planner_settings(manifest)[-1]
     rows = {
         "world": scenario.world,
         "robot": scenario.robot,
@@ -141,8 +142,8 @@ def document(manifest: Manifest, figures: Mapping[str, Any] | None = None) -> st
         "settings": ", ".join(f"{name}={value}" for name, value in settings.items()),
         "made by": ", ".join(f"{name} {value}" for name, value in manifest.made_by.items()),
     }
-    for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
-        rows[f"at iteration {branch.iteration:,} of {branch.file}"] = branch.told(after)
+    for branch, change in zip(manifest.branches, changes_of(manifest), strict=True):
+        rows[f"at iteration {branch.iteration:,} of {branch.file}"] = change
     rows = _results(figures) | rows
     table = "".join(f"| {name} | {_cell(value)} |\n" for name, value in rows.items())
     return f"### {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"

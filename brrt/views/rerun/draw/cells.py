@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Table
+from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.views.rerun import layout
 from brrt.views.rerun.draw.canvas import Canvas, growing_rows, merged
@@ -41,8 +42,8 @@ class Cells:
 
     def __init__(self, canvas: Canvas, sketches: dict[int, Sketch], manifest: Manifest) -> None:
         self._canvas, self._sketches = canvas, sketches
-        settings = manifest.scenario.settings()
-        self._edge, self._learns = float(settings.get("epsilon", 0.0)), "lookahead" in settings
+        contract = contract_of(manifest, canvas.world)
+        self._edge, self._learns = contract.epsilon, contract.learns
         radius = self._edge * (_IN_PLANE if canvas.dim == 2 else _IN_SPACE)
         fine = radius < _SMALLEST * canvas.world.extent
         self._radius = _DOT[canvas.dim] if fine else radius

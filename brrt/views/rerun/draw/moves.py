@@ -3,6 +3,7 @@
 import numpy as np
 
 from brrt.events import Events, Kind, Table
+from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.views.rerun import layout
 from brrt.views.rerun.draw.canvas import Canvas, growing_rows
@@ -23,7 +24,7 @@ class Moves:
     """
 
     def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
-        edge = float(manifest.scenario.settings().get("epsilon", 0.0))
+        edge = contract_of(manifest, canvas.world).epsilon
         limits = _IN_SPACE if edge and canvas.dim > 2 else ()
         self._canvas, self._thinning = canvas, Thinning(canvas.world, *limits)
         self._start = canvas.places([manifest.start])

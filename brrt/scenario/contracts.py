@@ -1,0 +1,124 @@
+"""The contracts and settings of a recorded run, with the registered planner where it states none.
+
+Recordings made before contracts were written, and those of other tools, state none; the planner
+registered under their name does. This is the only place where the reading wing reaches planners:
+by name, because an import statement would bring numba into it. Where planners cannot be imported,
+such a recording has no contract.
+"""
+
+import importlib
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+from brrt.errors import BrrtError
+from brrt.scenario.contract import Contract
+from brrt.scenario.manifest import Manifest
+from brrt.scenario.query import Query
+from brrt.scenario.scenario import Scenario
+from brrt.worlds.world import World
+
+
+def contracts_of(manifest: Manifest, world: World) -> tuple[Contract | None, ...]:
+    """Return the contract of each of a run's `stretches`; None where there is none.
+
+    Raises:
+        BrrtError: A contract is needed that the manifest does not state, and the manifest's query
+            is not free in the world or a parameter is wrong.
+    """
+    if None not in manifest.contracts:
+        return manifest.contracts
+    known = registered_contracts(manifest, world)
+    pairs = zip(manifest.contracts, known, strict=True)
+    return tuple(own if stated is None else stated for stated, own in pairs)
+
+
+def contract_of(manifest: Manifest, world: World) -> Contract:
+    """Return the contract that a run ended with, an empty one if there is none."""
+    return contracts_of(manifest, world)[-1] or Contract()
+
+
+def registered_contracts(manifest: Manifest, world: World) -> tuple[Contract | None, ...]:
+    """Return what the registered planner states for each of a run's `stretches`.
+
+    None where no planner of that name is registered, or planners cannot be imported.
+
+    Raises:
+        BrrtError: The manifest's query is not free in the world, or a parameter is wrong.
+    """
+    planners = [_registered(scenario) for _, scenario in manifest.stretches]
+    if None in planners:
+        return (None,) * len(planners)
+    query = Query.recorded(manifest, world)
+    return tuple(_planners().state_contract(planner, query) for planner in planners)
+
+
+def planner_settings(manifest: Manifest) -> tuple[Mapping[str, Any], ...]:
+    """Return all settings of the planner in each of a run's `stretches`, None for automatic ones.
+
+    Where those of one stretch are not known, the given parameters are returned for all.
+
+    Raises:
+        BrrtError: A parameter is wrong.
+    """
+    found: list[Mapping[str, Any]] = []
+    for (_, scenario), contract in zip(manifest.stretches, manifest.contracts, strict=True):
+        planner = _registered(scenario) if contract is None else None
+        if contract is not None:
+            found.append(contract.planner.settings or scenario.params)
+        elif planner is not None:
+            found.append(planner.as_dict())
+        else:
+            return tuple(scenario.params for _, scenario in manifest.stretches)
+    return tuple(found)
+
+
+def changes_of(manifest: Manifest) -> tuple[str, ...]:
+    """Return what changed at each branch of a run, in words."""
+    if not manifest.branches:
+        return ()
+    scenarios = [scenario for _, scenario in manifest.stretches]
+    rows = [
+        {**scenario.as_dict(), **settings}
+        for scenario, settings in zip(scenarios, planner_settings(manifest), strict=True)
+    ]
+    found = []
+    for branch, (before, now) in zip(manifest.branches, pairwise(rows), strict=True):
+        names = now.keys() - {"params", "seed", "start", "goal", "draws"}
+        changed = [name for name in sorted(names) if now[name] != before.get(name)]
+        parts = [f"{name} {_text(now[name])}, was {_text(before.get(name))}" for name in changed]
+        parts += [] if branch.seed is None else [f"draws from seed {branch.seed}"]
+        found.append("; ".join(parts) or "all as before")
+    return tuple(found)
+
+
+def origins_of(manifest: Manifest) -> tuple[str, ...]:
+    """Return for each branch of a run what it continues, from where, and what changed there."""
+    pairs = zip(manifest.branches, changes_of(manifest), strict=True)
+    return tuple(f"{branch.origin}: {change}" for branch, change in pairs)
+
+
+def _text(value: Any) -> str:
+    """Write a setting; None stands for one that the planner chooses."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "auto" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _planners() -> Any:
+    """Return the package of the planners; None where it cannot be imported."""
+    try:
+        return importlib.import_module("brrt.planners")
+    except ImportError:
+        return None
+
+
+def _registered(scenario: Scenario) -> Any:
+    """Return the registered planner with a scenario's settings; None where there is none."""
+    planners = _planners()
+    if planners is None or scenario.planner not in planners.PLANNERS:
+        return None
+    try:
+        return planners.make_planner(scenario)
+    except BrrtError as error:
+        raise BrrtError(f"the manifest is damaged: {error}") from None
