@@ -148,8 +148,10 @@ def _typed(name: str, value: Any, hint: Any) -> Any:
         if not isinstance(value, str):
             raise BrrtError(f"{name} must be a text, not {value!r}")
         return value
-    if hint is bool:
-        return _as_bool(name, value)
+    return _as_bool(name, value) if hint is bool else _as_number(name, value, hint)
+
+
+def _as_number(name: str, value: Any, hint: Any) -> Any:
     try:
         if isinstance(value, bool):
             raise TypeError  # noqa: TRY301 - a truth value is no number
