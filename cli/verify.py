@@ -81,6 +81,7 @@ def verify(
     broken = sum(result.broken for result in results)
     known = contracts_of(recording.manifest, recording.world)[-1] is not None
     again = _again(recording, saved, tolerance) if rerun else None
+    _note_differences(recording)
     if as_json:
         print_json(
             {
@@ -96,12 +97,27 @@ def verify(
         if cut and not saved.cut:
             note(f"{run} breaks off; what is promised of a run's end was left out")
         if not known:
-            note(f"planner {planner} is not known here; its special promises were not checked")
+            note(
+                f"planner {planner} is not registered and the recording states no contract; only "
+                "what all planners promise was checked"
+            )
         _show(run, results, long=long)
         if again is not None:
             _show_again(again)
     if broken or (again is not None and not again.equal):
         raise typer.Exit(Code.FAILED)
+
+
+def _note_differences(recording: "Recording") -> None:
+    """Note where another version's planner stated another contract; no rule judges that."""
+    from brrt.scenario.contracts import contract_differences  # noqa: PLC0415
+    from brrt.verification.rules.contracts import same_version  # noqa: PLC0415
+
+    manifest = recording.manifest
+    if not same_version(manifest):
+        made_by = manifest.made_by.get("brrt", "of unknown version")
+        for difference in contract_differences(manifest, recording.world) or ():
+            note(f"the contract is that of brrt {made_by}: {difference}")
 
 
 def _again(recording: "Recording", saved: Saved, tolerance: float | None) -> "Again":

@@ -7,7 +7,10 @@ such a recording has no contract.
 """
 
 import importlib
+import math
+from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
@@ -51,6 +54,47 @@ def registered_contracts(manifest: Manifest, world: World) -> tuple[Contract | N
         return (None,) * len(planners)
     query = Query.recorded(manifest, world)
     return tuple(_planners().state_contract(planner, query) for planner in planners)
+
+
+def contract_differences(manifest: Manifest, world: World) -> list[str] | None:
+    """Say where stated contracts differ from those of the registered planner.
+
+    Returns:
+        A sentence for each difference; None where there are no two contracts to compare.
+
+    Raises:
+        BrrtError: The manifest's query is not free in the world, or a parameter is wrong.
+    """
+    if not any(manifest.contracts):
+        return None
+    pairs = zip(manifest.contracts, registered_contracts(manifest, world), strict=True)
+    known = [(stated, own) for stated, own in pairs if stated is not None and own is not None]
+    found = [
+        f"{name} is {ours[name]} in the contract; the registered planner states {theirs[name]}"
+        for ours, theirs in ([_promises(contract) for contract in pair] for pair in known)
+        for name in ours.keys() | theirs.keys()
+        if not _equal(ours[name], theirs[name])
+    ]
+    return sorted(found) if known else None
+
+
+def _promises(contract: Contract) -> defaultdict[str, Any]:
+    """Return what rules judge by, by name."""
+    parts = asdict(contract)
+    about = parts.pop("planner")
+    parts |= {"settings": about["settings"], "default_iterations": about["default_iterations"]}
+    found: defaultdict[str, Any] = defaultdict(lambda: None)
+    for name, value in parts.items():
+        nested = value if isinstance(value, dict) else {"": value}
+        found |= {f"{name} {field}".strip(): number for field, number in nested.items()}
+    return found
+
+
+def _equal(a: Any, b: Any) -> bool:
+    """Whether values are equal; numbers may be rounded."""
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=1e-9)
+    return bool(a == b)
 
 
 def planner_settings(manifest: Manifest) -> tuple[Mapping[str, Any], ...]:

@@ -19,6 +19,7 @@ from brrt.scenario.manifest import Manifest
 from brrt.verification.context import Context, Windows
 from brrt.verification.result import Finding, RuleResult
 from brrt.verification.rules import (
+    contracts,
     extension,
     lattice,
     log,
@@ -37,8 +38,9 @@ from brrt.worlds.world import World
 Rule = Callable[[Context, RuleResult], Windows | None]
 
 RULES: tuple[Rule, ...] = (
-    *log.RULES, *sequence.RULES, *sampling.RULES, *trees.RULES, *extension.RULES, *rewiring.RULES,
-    *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *lrta_star.RULES, *search.RULES,
+    *log.RULES, *contracts.RULES, *sequence.RULES, *sampling.RULES, *trees.RULES,
+    *extension.RULES, *rewiring.RULES, *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES,
+    *lrta_star.RULES, *search.RULES,
 )  # fmt: skip
 
 
