@@ -14,7 +14,7 @@ from brrt.events import Events, Phase, Stage, Status, table_dtype
 from brrt.kernels.emit import EventLog
 from brrt.views.rerun.sink import RerunSink
 from tests.conftest import Result, recorded, result_of
-from tests.support.toys import TOYS
+from tests.support.toys import TOYS, Silent
 
 FOREIGN = Scenario(
     world="circles2d:n=12,seed=3", planner="their-own", params={"zeal": 7}, seed=3, iterations=60
@@ -24,7 +24,7 @@ FOREIGN = Scenario(
 @pytest.fixture
 def files(tmp_path: Path) -> list[Path]:
     """A recording of a planner that brrt does not know, in both formats."""
-    run = Run(FOREIGN, planner=TOYS["pair"])
+    run = Run(FOREIGN, planner=Silent())
     paths, world = [tmp_path / "their.mcap", tmp_path / "their.rrd"], run.problem.world
     run.execute(
         [McapSink(paths[0], run.manifest, world), RerunSink(run.manifest, world, path=paths[1])]
@@ -47,7 +47,7 @@ def test_recordings_need_no_class(brrt: Callable[..., Result], files: list[Path]
         assert brrt("replay", path, "--rrd", "again.rrd", "--force").code == 0
         done = brrt("verify", path)
         assert done.code == 0
-        assert "planner their-own is not known here" in done.err
+        assert "planner their-own is not registered and the recording states no contract" in done.err
         assert brrt("verify", path, "--json").json["planner_known"] is False
 
 

@@ -251,4 +251,14 @@ class March:
         yield log.drain()
 
 
+class Silent:
+    """A toy that states no contract."""
+
+    def solve(
+        self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+    ) -> Iterator[Events]:
+        """See `Planner.solve`."""
+        yield from Pair().solve(problem, rng, log, stop)
+
+
 TOYS: dict[str, Any] = {"star": Star(), "pair": Pair(), "walk": Walk(), "march": March()}

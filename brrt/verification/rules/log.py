@@ -129,7 +129,8 @@ def _with_path(context: Context) -> set[Status]:
     """How planning may end where there is a path: who improves it, or tries again, has a budget."""
     lattices = [contract.lattice for _, contract in context.stretches]
     again = any(lattice is not None and lattice.trials > 1 for lattice in lattices)
-    if context.contract.near is None and context.known and not again:
+    stops = context.contract.near is None and context.contract.stops is not False
+    if stops and context.known and not again:
         return {Status.SOLVED, Status.INTERRUPTED}
     return set(Status) - {Status.BEGIN} - {s for s in Status if s.name == "NO_PATH"}
 
