@@ -101,11 +101,9 @@ def test_contracts_of_branches(tmp_path: Path) -> None:
     bare = replace(parent.manifest, contract=None)
     for manifest in (parent.manifest, bare):
         recording = Recording(manifest, parent.problem.world, lambda: [log])
-        run = BranchedRun(recording, iteration=2, params={"step": 2.0})
-        branch = Events.concat(2, run.events())
-        twice = Recording(run.manifest, run.problem.world, lambda each=branch: [each])
-        run = BranchedRun(twice, iteration=4, params={"goal_bias": 0.5})
-        events = Events.concat(2, run.events())
+        once = BranchedRun(recording, iteration=2, params={"step": 2.0}).record()
+        run = BranchedRun(once, iteration=4, params={"goal_bias": 0.5})
+        events = run.record().events()
         path = saved(run, events, tmp_path / f"{manifest.contract is None}.mcap")
         kept = read(path).manifest
         assert kept == run.manifest
