@@ -30,6 +30,7 @@ _MODULES = {
     "World": "worlds",
     "load_world": "worlds",
     "make_world": "worlds",
+    "Contract": "scenario.contract",
     "Manifest": "scenario.manifest",
     "Scenario": "scenario.scenario",
     "PLANNERS": "planners",

@@ -35,6 +35,7 @@ from brrt.runs.branched import RepeatedRun as RepeatedRun
 from brrt.runs.reproduce import Again as Again
 from brrt.runs.reproduce import plan_again as plan_again
 from brrt.runs.run import Run as Run
+from brrt.scenario.contract import Contract as Contract
 from brrt.scenario.manifest import Manifest as Manifest
 from brrt.scenario.scenario import Scenario as Scenario
 from brrt.testing.gate import Verdict as Verdict
