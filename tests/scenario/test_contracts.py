@@ -23,7 +23,7 @@ from brrt import (
     check,
     read,
 )
-from brrt.comparison.settings_diff import settings_of
+from brrt.comparison.settings import settings_of
 from brrt.events import Events
 from brrt.planners import PLANNERS, make_planner, state_contract
 from brrt.scenario import contracts
