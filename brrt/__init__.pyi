@@ -30,10 +30,10 @@ from brrt.robots import Point as Point
 from brrt.robots import Polygon as Polygon
 from brrt.robots import Robot as Robot
 from brrt.robots import make_robot as make_robot
-from brrt.runs.branched import BranchedRun as BranchedRun
-from brrt.runs.branched import RepeatedRun as RepeatedRun
-from brrt.runs.reproduce import Again as Again
-from brrt.runs.reproduce import plan_again as plan_again
+from brrt.runs.branch import BranchedRun as BranchedRun
+from brrt.runs.reproduce import ReproducedRun as ReproducedRun
+from brrt.runs.reproduce import Reproduction as Reproduction
+from brrt.runs.reproduce import reproduce as reproduce
 from brrt.runs.run import Run as Run
 from brrt.scenario.contract import Contract as Contract
 from brrt.scenario.manifest import Manifest as Manifest

@@ -43,14 +43,13 @@ def go_on(
     """
     from brrt.errors import RecordingError  # noqa: PLC0415
     from brrt.formats import BrokenError, read  # noqa: PLC0415
-    from brrt.runs.branch import last_whole_iteration  # noqa: PLC0415
-    from brrt.runs.branched import BranchedRun  # noqa: PLC0415
+    from brrt.runs.branch import BranchedRun, last_complete_iteration  # noqa: PLC0415
 
     seed = given.pop("seed", None)
     try:
         run = BranchedRun(read(parent), params=params, seed=seed, settings=given, **limits)
     except BrokenError as error:
-        last, _ = last_whole_iteration(read(parent, partial=True).batches(), {})
+        last, _ = last_complete_iteration(read(parent, partial=True).batches(), {})
         if last < 0:
             raise RecordingError(f"{error.fault}; nothing of planning is whole") from None
         raise RecordingError(

@@ -1,6 +1,7 @@
 """`brrt verify`: whether a recording keeps what its planner promises."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ from .saved import Saved, opened
 
 if TYPE_CHECKING:
     from brrt.recording import Recording
-    from brrt.runs.reproduce import Again
+    from brrt.runs.reproduce import Reproduction
     from brrt.verification import RuleResult
 
 _SHOWN = 3
@@ -80,7 +81,7 @@ def verify(
     cut, events = saved.cut or recording.result is None, saved.events
     broken = sum(result.broken for result in results)
     known = contracts_of(recording.manifest, recording.world)[-1] is not None
-    again = _again(recording, saved, tolerance) if rerun else None
+    again = _reproduced(recording, saved, tolerance) if rerun else None
     _note_differences(recording)
     if as_json:
         print_json(
@@ -120,9 +121,9 @@ def _note_differences(recording: "Recording") -> None:
             note(f"the contract is that of brrt {made_by}: {difference}")
 
 
-def _again(recording: "Recording", saved: Saved, tolerance: float | None) -> "Again":
+def _reproduced(recording: "Recording", saved: Saved, tolerance: float | None) -> "Reproduction":
     """Plan the run again, with a progress bar."""
-    from brrt.runs.reproduce import TOLERANCE, plan_again  # noqa: PLC0415
+    from brrt.runs.reproduce import TOLERANCE, reproduce  # noqa: PLC0415
 
     def watch(done: int, total: int) -> None:
         bar.total = total
@@ -130,16 +131,14 @@ def _again(recording: "Recording", saved: Saved, tolerance: float | None) -> "Ag
 
     tell_of_compiling()
     with Watch(None, "preparing the planner").running() as bar:
-        return plan_again(
-            recording.manifest,
-            recording.world,
-            lambda: iter(saved),
+        return reproduce(
+            replace(recording, batches=lambda: iter(saved)),
             tolerance=TOLERANCE if tolerance is None else tolerance,
             watch=watch,
         )
 
 
-def _show_again(again: "Again") -> None:
+def _show_again(again: "Reproduction") -> None:
     """Print what differs, and in the last line, or the only one, whether the events are equal."""
     *details, verdict = again.lines()
     print_lines(details)

@@ -1,95 +1,111 @@
-"""Where and whether a recorded run can go on with other settings."""
+"""Runs that branch off a recorded one: they continue it with other settings."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, replace
 from os import PathLike
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from brrt.errors import BrrtError, unknown
-from brrt.events import Events, Kind, Phase, Status
-from brrt.planners import PLANNERS, check_params, make_planner, make_stop
+from brrt.events import Events, Status
+from brrt.planners import check_params, make_planner, make_stop, state_contract
 from brrt.planners.base.kernel_planner import KernelPlanner, KernelRun
 from brrt.planners.base.stop import Stop
-from brrt.scenario.manifest import Manifest
+from brrt.recording import Limits, Recording, check_limits
+from brrt.runs.resume import (
+    Continuation,
+    RecordedRun,
+    SharedEvents,
+    end_of_planning,
+    kernel_planner,
+    name_of,
+    restored,
+)
+from brrt.scenario.manifest import Branch, Manifest
 from brrt.scenario.scenario import Scenario
-from brrt.worlds.world import World
 
 _CHANGEABLE = ("iterations", "time", "smooth", "shortcuts", "execute", "max_move", "deadline")
-"""What of a scenario may be another from a branch on, beside the planner's parameters."""
+"""Fields of the scenario that a branch may change, beside the planner's parameters."""
 
 
-@runtime_checkable
-class Recorded(Protocol):
-    """A recording, as far as it matters here."""
+class BranchedRun(RecordedRun):
+    """Continues a recorded run from an iteration with other settings; those not given stay.
 
-    @property
-    def manifest(self) -> Manifest:
-        """What the run was."""
+    It plans again up to that iteration and compares every event with the recording. Its log begins
+    with the recorded events, times included.
 
-    @property
-    def world(self) -> World:
-        """The world it ran in."""
+    Args:
+        recording: What `brrt.read` or `Run.record` returns.
+        params: Settings of the planner.
+        seed: Seed of the draws after the branch; by default the generator continues.
+        settings: Fields of the scenario: iterations and time, both counted from the start of the
+            run; smooth, shortcuts, execute, max_move and deadline.
+        batch: Events in a batch at most; the log does not depend on it.
+        until: The instant, as `Events.until` takes it: `iteration`, `seq` or `t`. The branch is
+            after the last iteration that was complete by then; by default at the end of planning.
 
-    @property
-    def batches(self) -> Callable[[], Iterable[Events]]:
-        """Call it for the events, in batches, in order."""
-
-    @property
-    def name(self) -> str:
-        """The file's name, empty where there is none."""
-
-
-@dataclass(slots=True)
-class Shared:
-    """The recorded events of planning up to the end of an iteration, all but planning's own end.
-
-    Attributes:
-        recorded: The recording.
-        iteration: The last that counts.
-        events: How many there are, once they were read.
-        t: Time of the last of them in ns.
+    Raises:
+        BrrtError: The recording cannot be continued there, a setting is wrong, or planning again
+            differs from the recording.
     """
 
-    recorded: Recorded
-    iteration: int
-    events: int = 0
-    t: int = 0
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        params: Mapping[str, Any] | None = None,
+        seed: int | None = None,
+        settings: Mapping[str, Any] | None = None,
+        batch: int = 8192,
+        **until: int,
+    ) -> None:
+        _check_recording(recording)
+        check_limits(until, "params", "seed", "settings", "batch")
+        iteration, ended = _branching_point(recording, until)
+        before = recording.manifest.ruling(iteration)
+        scenario = _changed(before, params or {}, seed, settings or {})
+        planner, parent = kernel_planner(scenario), kernel_planner(before.scenario)
+        _check_fixed(parent, planner)
+        # If only what follows planning changes, the last iteration of planning is made again.
+        after = ended is not None and seed is None and _plans_alike(before.scenario, scenario)
+        if after and ended is Status.SOLVED and before.ruling(iteration - 1) == before:
+            iteration -= 1
+        else:
+            _check_open(recording, iteration, ended, parent, planner)
+        super().__init__(recording, before, scenario, planner, batch)
+        shared = SharedEvents(recording, iteration)
+        run = restored(shared, before, self.problem, self._rng, self._log)
+        if not after:
+            _check_budget(recording, run, shared.t, self.stop)
+        run.switch_settings(planner.loop(self.problem, self.stop), seed)
+        self._planner = Continuation(run, shared)
+        here = Branch(
+            parent=recording.manifest.digest(),
+            file=recording.name,
+            iteration=iteration,
+            events=shared.count,
+            scenario=before.scenario,
+            seed=seed,
+            contract=before.contract or state_contract(parent, self.problem),
+        )
+        # Times continue from the recorded ones, so time 0 lies that much earlier.
+        epoch = self.manifest.epoch_ns - (0 if scenario.clock == "logical" else shared.t)
+        branches = (*before.branches, here)
+        self.manifest = replace(self.manifest, branches=branches, epoch_ns=max(epoch, 0))
 
-    def __iter__(self) -> Iterator[Events]:
-        """Read them."""
-        self.events = self.t = 0
-        for batch in self.recorded.batches():
-            end, _ = _end_of_planning(batch)
-            part = batch.until(seq=end, iteration=self.iteration)
-            if len(part):
-                self.events, self.t = self.events + len(part), part.last.t
-                yield part
-            if len(part) < len(batch):
-                return
 
-
-def _end_of_planning(batch: Events) -> tuple[int | None, Status | None]:
-    """Return the number of the last event ahead of planning's end, and how it ended, if it did."""
-    phases = batch[Kind.PHASE]
-    ends = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)]
-    return (int(ends["seq"][0]) - 1, Status(int(ends["status"][0]))) if len(ends) else (None, None)
-
-
-def last_whole_iteration(
-    batches: Iterable[Events], limits: Mapping[str, int]
-) -> tuple[int, Status | None]:
-    """Find the last iteration of planning that was over at an instant; -1 if none was.
+def last_complete_iteration(batches: Iterable[Events], limits: Limits) -> tuple[int, Status | None]:
+    """Find the last iteration of planning that was complete at an instant; -1 if none was.
 
     Args:
         batches: The events.
-        limits: The instant, as `Events.until` takes it; by default the end of planning.
+        limits: The instant; the end of planning if empty.
 
     Returns:
-        The iteration, and how planning ended if it did right behind it.
+        The iteration, and how planning ended if it did right after it.
     """
     last = -1
     for batch in batches:
-        end, status = _end_of_planning(batch)
+        end, status = end_of_planning(batch)
         inside = batch.until(seq=end)
         part = inside.until(**limits)
         if len(part):
@@ -103,65 +119,60 @@ def last_whole_iteration(
             return (last if following > last else last - 1), None
         if status is not None:
             return last, status
-    # The log breaks off: more of its last iteration may have happened.
+    # The log is cut: its last iteration may have had more events.
     return last - 1, None
 
 
-def called(recorded: Recorded) -> str:
-    """Name a recording in messages."""
-    return recorded.name or "the recording"
-
-
-def branching_point(recorded: Recorded, limits: Mapping[str, int]) -> tuple[int, Status | None]:
-    """Find the iteration to branch behind; see `last_whole_iteration`.
+def _branching_point(recording: Recording, limits: Limits) -> tuple[int, Status | None]:
+    """Find the iteration to branch after; see `last_complete_iteration`.
 
     Raises:
-        BrrtError: Planning had ended before, or nothing was recorded.
+        BrrtError: There are no events, or planning ended before the instant.
     """
-    if not any(map(len, recorded.batches())):
-        raise BrrtError(f"{called(recorded)}: it holds no event to branch behind")
-    iteration, status = last_whole_iteration(recorded.batches(), limits)
+    if not any(map(len, recording.batches())):
+        raise BrrtError(f"{name_of(recording)}: it has no events to branch after")
+    iteration, status = last_complete_iteration(recording.batches(), limits)
     if "iteration" in limits and limits["iteration"] > iteration:
-        end = "it breaks off behind" if status is None else "planning ended with"
+        end = "it is cut after" if status is None else "planning ended with"
         raise BrrtError(
-            f"{called(recorded)}: {end} iteration {iteration:,}; branch there at the latest, and "
+            f"{name_of(recording)}: {end} iteration {iteration:,}; branch there at the latest, and "
             "what follows planning is made anew"
         )
     return max(iteration, 0), status
 
 
-def check_recording(given: Any) -> None:
-    """See that what is to be gone on from is a recording.
+def _check_recording(given: Any) -> None:
+    """Raise unless `given` is a recording.
 
     Raises:
         BrrtError: It is the name of one, or something else.
     """
     if isinstance(given, str | PathLike):
         path = str(given)
-        raise BrrtError(f"a branch goes on from a recording: give brrt.read({path!r})")
-    if not isinstance(given, Recorded):
+        raise BrrtError(f"a branch continues a recording: give brrt.read({path!r})")
+    if not isinstance(given, Recording):
         kind = type(given).__name__
-        raise BrrtError(f"a branch goes on from what brrt.read returns, not from {kind}")
+        raise BrrtError(f"a branch continues a brrt.Recording, as brrt.read returns, not {kind}")
 
 
-def check_open(
-    recorded: Recorded,
+def _check_open(
+    recording: Recording,
     iteration: int,
     ended: Status | None,
     before: KernelPlanner,
     now: KernelPlanner,
 ) -> None:
-    """See that a run can go on behind its end.
+    """Raise if planning cannot continue after an iteration.
 
     Args:
-        recorded: The recording.
-        iteration: Where the branch is to be.
-        ended: How planning ended there; None where it did not.
+        recording: The recording.
+        iteration: Where the branch is.
+        ended: How planning ended there; None if it did not.
         before: The planner up to there.
         now: The planner from there on.
 
     Raises:
-        BrrtError: The run ended with a path and the settings say to stop there, or with the proof
+        BrrtError: The run ended with a path and the new settings stop there too, or with the proof
             that there is no path.
     """
     if ended is Status.SOLVED and now.ends_where(before):
@@ -172,35 +183,35 @@ def check_open(
     else:
         return
     raise BrrtError(
-        f"{called(recorded)}: the run ended with {outcome} at iteration {iteration:,}; branch "
+        f"{name_of(recording)}: the run ended with {outcome} at iteration {iteration:,}; branch "
         f"before that (--at-iteration){remedy}"
     )
 
 
-def check_budget(recorded: Recorded, drive: KernelRun, t: int, stop: Stop) -> None:
-    """See that the budget, which counts from the start of the run, is not used up.
+def _check_budget(recording: Recording, run: KernelRun, t: int, stop: Stop) -> None:
+    """Raise if the budget, which counts from the start of the run, is used up.
 
     Raises:
         BrrtError: It is.
     """
-    due = stop.reached(drive.counted, t / 1e9)
+    due = stop.reached(run.counted, t / 1e9)
     if due is Status.TIME_LIMIT:
         spent = f"{t / 1e9:.6g} s have passed of {stop.time_s:g}; give more by --time"
-    elif due is not None or (stop.draws is not None and drive.drawn >= stop.draws):
+    elif due is not None or (stop.draws is not None and run.drawn >= stop.draws):
         most = min(stop.iterations, stop.iterations if stop.draws is None else stop.draws)
-        spent = f"{drive.counted:,} of {most:,} iterations are made; give more by --iterations"
+        spent = f"{run.counted:,} of {most:,} iterations are made; give more by --iterations"
     else:
         return
-    raise BrrtError(f"{called(recorded)}: at the branch {spent}, counted from the run's start")
+    raise BrrtError(f"{name_of(recording)}: at the branch {spent}, counted from the run's start")
 
 
-def changed(
+def _changed(
     manifest: Manifest, params: Mapping[str, Any], seed: int | None, settings: Mapping[str, Any]
 ) -> Scenario:
-    """Return the scenario of a run with other settings; what is not given stays as it was.
+    """Return the scenario of a run with other settings; those not given stay.
 
     Raises:
-        BrrtError: A setting cannot change, or a value is of no use.
+        BrrtError: A setting cannot change, or a value is wrong.
     """
     for name in settings:
         if name in _CHANGEABLE:
@@ -214,48 +225,29 @@ def changed(
         values["draws"] = None
     if seed is not None:
         values["seed"] = seed
-    # The query was drawn from the first seed.
+    # A random start or goal was drawn from the first seed.
     for name in ("start", "goal"):
         if isinstance(values[name], str):
             values[name] = getattr(manifest, name)
     return check_params(Scenario.parse(values))
 
 
-def loop_planner(scenario: Scenario) -> KernelPlanner:
-    """Make a scenario's planner, which must be one that can take other settings on its way.
-
-    Raises:
-        BrrtError: It is not.
-    """
-    if scenario.planner not in PLANNERS:
-        raise BrrtError(
-            f"planner {scenario.planner} is not known here, so nobody can go on with it"
-        )
-    planner = make_planner(scenario)
-    if not isinstance(planner, KernelPlanner):
-        raise BrrtError(
-            f"planner {scenario.planner} cannot be stopped and go on (it is no LoopPlanner): plan "
-            "again with other settings"
-        )
-    return planner
-
-
-def plans_alike(before: Scenario, now: Scenario) -> bool:
-    """Whether two scenarios differ, but in nothing that planning knows of."""
+def _plans_alike(before: Scenario, now: Scenario) -> bool:
+    """Whether two scenarios differ, but in nothing that affects planning."""
     same = make_planner(before) == make_planner(now) and make_stop(before) == make_stop(now)
     return same and before != now
 
 
-def check_settled(before: KernelPlanner, now: KernelPlanner) -> None:
-    """See that nothing is another that was settled when the run began.
+def _check_fixed(before: KernelPlanner, now: KernelPlanner) -> None:
+    """Raise if a setting differs that is fixed from the start of a run.
 
     Raises:
-        BrrtError: Something is.
+        BrrtError: One does.
     """
     for name in now.fixed_params:
         then, wanted = getattr(before, name), getattr(now, name)
         if wanted != then:
             raise BrrtError(
-                f"{name} cannot be {wanted} from here on: the lattice was laid at the start, with "
-                f"{name} {then}; leave it out, or plan again"
+                f"{name} cannot change to {wanted} at a branch: the lattice is laid at the start, "
+                f"with {name} {then}; leave it out, or plan from the start"
             )

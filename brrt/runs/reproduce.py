@@ -1,4 +1,4 @@
-"""Plan a recorded run again, from its manifest alone, and compare event by event."""
+"""Reproduce a recorded run from its manifest alone, and compare event by event."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -9,14 +9,14 @@ from brrt.comparison.events import Deviation, first_difference
 from brrt.comparison.settings import Row, rows_of
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
-from brrt.planners import PLANNERS
-from brrt.runs.branched import RepeatedRun
-from brrt.runs.run import Run, made_by
-from brrt.scenario.manifest import Manifest
-from brrt.worlds.world import World
+from brrt.planners import PLANNERS, make_planner, make_stop
+from brrt.recording import Recording
+from brrt.runs.resume import BranchedPlan, RecordedRun
+from brrt.runs.run import made_by
+from brrt.scenario.scenario import Scenario
 
 TOLERANCE = 1e-9
-"""How far apart numbers may be that another machine has rounded; see `Deviation`."""
+"""Greatest deviation of numbers that another machine may have rounded; see `Deviation`."""
 
 _BY_COUNT: Mapping[tuple[int, int], int] = {
     (Phase.PLAN, Status.TIME_LIMIT): Status.ITERATION_LIMIT,
@@ -24,19 +24,50 @@ _BY_COUNT: Mapping[tuple[int, int], int] = {
     (Phase.SMOOTH, Status.INTERRUPTED): Status.DONE,
     (Phase.EXECUTE, Status.INTERRUPTED): Status.DONE,
 }
-"""How a phase ends that the clock or a person ended, where it is ended by count instead."""
+"""How a phase that the clock or an interruption ended ends when a count ends it instead."""
+
+
+class ReproducedRun(RecordedRun):
+    """Runs again what a recording's manifest states, its branches included.
+
+    Args:
+        recording: The recording; its events are not read.
+        draws: Iteration at which planning ends, for a run that the clock or an interruption ended.
+        batch: Events in a batch at most; the log does not depend on it.
+
+    Raises:
+        BrrtError: The planner is not registered, or the manifest is damaged.
+    """
+
+    def __init__(
+        self, recording: Recording, *, draws: int | None = None, batch: int = 8192
+    ) -> None:
+        manifest = recording.manifest
+        scenario = manifest.scenario
+        if draws is not None:
+            scenario = stopped_at(scenario, draws)
+        super().__init__(recording, manifest, scenario, make_planner(scenario), batch)
+        if manifest.branches:
+            self._planner = BranchedPlan(replace(manifest, scenario=scenario))
+            self.manifest = replace(self.manifest, branches=manifest.branches)
+
+
+def stopped_at(scenario: Scenario, iteration: int) -> Scenario:
+    """Return the scenario of a run that ends at an iteration instead of by the clock."""
+    limit = make_stop(scenario).iterations
+    return replace(scenario, draws=max(1, iteration), iterations=limit, time=None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Again:
-    """How a run that was planned again compares with its recording.
+class Reproduction:
+    """How a reproduced run compares with its recording.
 
     Attributes:
         events: Events that were compared.
-        first: The first one that differs; None where none does.
-        deviation: How far apart numbers may be, and how far apart they were.
-        versions: What is another version, or platform, here.
-        ended: What ended the recorded run, where that was not the run itself; empty where it was.
+        first: The first one that differs; None if none does.
+        deviation: The allowed and the greatest deviation of numbers.
+        versions: Versions, and the platform, that differ here.
+        ended: What ended the recorded run from outside; empty if nothing did.
     """
 
     events: int
@@ -51,11 +82,11 @@ class Again:
         return self.first is None
 
     def lines(self) -> Iterator[str]:
-        """Tell it in plain text."""
+        """Write it as plain text."""
         for row in self.versions:
             yield f"made with {row.name} {row.a or 'unknown'}; here it is {row.b or 'unknown'}"
         if self.ended:
-            yield f"{self.ended}; it was planned again as far as that"
+            yield f"{self.ended}; it was planned again up to there"
         if self.first is not None:
             yield from self.first.lines(("recorded", "again"))
             return
@@ -82,57 +113,55 @@ class Again:
         }
 
 
-def plan_again(
-    manifest: Manifest,
-    world: World,
-    batches: Callable[[], Iterable[Events]],
+def reproduce(
+    recording: Recording,
     *,
     tolerance: float = TOLERANCE,
     watch: Callable[[int, int], None] | None = None,
-) -> Again:
-    """Plan a recorded run again and compare; neither log is held in memory.
+) -> Reproduction:
+    """Run a recording's manifest again and compare the events; neither log is kept in memory.
 
-    World, robot, start and goal are those of the recording, wherever they came from. Times do not
-    count. Where the clock or a person ended the run, it is ended after the same iteration.
+    World, robot, start and goal are the recorded ones. Times are not compared. A run that the
+    clock or an interruption ended is ended at the same iteration.
 
     Args:
-        manifest: The run's.
-        world: The run's.
-        batches: Call it for the recorded events, in order; it is called twice.
-        tolerance: How far apart numbers may be; see `Deviation`.
-        watch: Called with the events planned so far and those that there are.
+        recording: The recording; its events are read twice.
+        tolerance: Greatest deviation of numbers; see `Deviation`.
+        watch: Called with the events made so far and their number in the recording.
 
     Raises:
-        BrrtError: The planner is not known here, or the recording is of no use.
+        BrrtError: The planner is not registered, or the manifest is damaged.
     """
-    scenario, deviation = manifest.scenario, Deviation(allowed=tolerance)
-    if scenario.planner not in PLANNERS:
+    manifest = recording.manifest
+    planner, deviation = manifest.scenario.planner, Deviation(allowed=tolerance)
+    if planner not in PLANNERS:
         raise BrrtError(
-            f"planner {scenario.planner} is not known here; only a program that has it can plan "
-            f"the run again"
+            f"planner {planner} is not registered; only a program that has it can plan the run "
+            "again"
         )
-    end = _Ending.of(batches())
-    run = _run(manifest, world, end)
-    again = run.events() if watch is None else _watched(run.events(), end.events, watch)
-    if end.cut or end.by_person:
-        again = _up_to(end.compared, again)
-    first = first_difference(
-        map(_ended_by_count, _up_to(end.compared, batches())), again, deviation
-    )
-    ended = end.told()
+    end = _Ending.of(recording.batches())
+    made = _run(recording, end).events()
+    if watch is not None:
+        made = _watched(made, end.events, watch)
+    if end.cut or end.interrupted:
+        made = _first(end.compared, made)
+    kept = map(_ended_by_count, _first(end.compared, recording.batches()))
+    first, ended = first_difference(kept, made, deviation), end.text()
     if first is not None and first.left is None and _begins_phase(first.right):
-        # Between two phases no event says that a person ended the run: the next phase is missing.
-        ended, first = f"somebody ended the run ahead of the phase {first.right['name']}", None
+        # An interruption between two phases leaves no event: the next phase is missing.
+        ended, first = f"the run was interrupted before the phase {first.right['name']}", None
     versions = tuple(rows_of("", manifest.made_by, made_by()))
-    return Again(end.compared, first, deviation, versions, ended)
+    return Reproduction(end.compared, first, deviation, versions, ended)
 
 
-def _run(manifest: Manifest, world: World, end: "_Ending") -> Run:
-    """Make the run that the manifest tells of, ended by count where it was ended otherwise."""
+def _run(recording: Recording, end: "_Ending") -> ReproducedRun:
+    """Make the run, ended by counts where the clock or an interruption ended the recorded one."""
     if end.attempts is not None:
-        manifest = replace(manifest, scenario=replace(manifest.scenario, shortcuts=end.attempts))
-    run = RepeatedRun(manifest, world, draws=end.draws)
-    # A run may have been ended ahead of its first draw, which no scenario can say.
+        manifest = recording.manifest
+        scenario = replace(manifest.scenario, shortcuts=end.attempts)
+        recording = replace(recording, manifest=replace(manifest, scenario=scenario))
+    run = ReproducedRun(recording, draws=end.draws)
+    # A run may have ended before its first draw; a scenario cannot state that.
     run.stop.draws = run.stop.draws if end.draws is None else end.draws
     run.stop.time_s = None
     return run
@@ -143,26 +172,26 @@ class _Ending:
     """How a recorded run ended.
 
     Attributes:
-        events: Events that there are.
-        draws: The iteration at which the clock or a person ended planning.
-        attempts: Shortcuts after which a person ended smoothing.
+        events: Number of events.
+        draws: The iteration at which the clock or an interruption ended planning.
+        attempts: Shortcuts after which smoothing was interrupted.
         by_clock: Whether the clock ended planning.
-        by_person: Whether a person ended a phase.
-        driving: Whether that was the robot's drive.
-        cut: Whether the log breaks off within a phase.
+        interrupted: Whether a phase was interrupted.
+        moving: Whether that phase was execution.
+        cut: Whether the log ends within a phase.
     """
 
     events: int = 0
     draws: int | None = None
     attempts: int | None = None
     by_clock: bool = False
-    by_person: bool = False
-    driving: bool = False
+    interrupted: bool = False
+    moving: bool = False
     cut: bool = True
 
     @classmethod
     def of(cls, batches: Iterable[Events]) -> Self:
-        """Go through a log."""
+        """Fold a log."""
         end, attempts = cls(), 0
         for batch in batches:
             end.events += len(batch)
@@ -175,37 +204,37 @@ class _Ending:
         return end
 
     def _take(self, event: Any, attempts: int) -> None:
-        """Take in the beginning or the end of a phase."""
+        """Take the event that begins or ends a phase."""
         phase, status = int(event["name"]), int(event["status"])
         if (phase, status) not in _BY_COUNT:
             return
         self.by_clock |= status == Status.TIME_LIMIT
-        self.by_person |= status == Status.INTERRUPTED
+        self.interrupted |= status == Status.INTERRUPTED
         if phase == Phase.PLAN:
             self.draws = int(event["iteration"])
         elif phase == Phase.SMOOTH:
             self.attempts = attempts
         else:
-            self.driving = True
+            self.moving = True
 
     @property
     def compared(self) -> int:
-        """Events that a run can be held to; a drive that goes on has a move for its last."""
-        return self.events - self.driving
+        """Events to compare: where execution was interrupted, the reproduced run makes a move."""
+        return self.events - self.moving
 
-    def told(self) -> str:
-        """Say what ended the run, where that was not the run itself."""
-        if self.by_person:
-            return "somebody ended the run" + (
+    def text(self) -> str:
+        """Say what ended the run from outside; empty if nothing did."""
+        if self.interrupted:
+            return "the run was interrupted" + (
                 f" in iteration {self.draws:,}" if self.draws else ""
             )
         if self.cut:
-            place = f"behind event {self.events - 1:,}" if self.events else "ahead of any event"
-            return f"the recording breaks off {place}"
+            place = f"after event {self.events - 1:,}" if self.events else "before any event"
+            return f"the recording is cut {place}"
         return f"the clock ended planning in iteration {self.draws:,}" if self.by_clock else ""
 
 
-def _up_to(count: int, batches: Iterable[Events]) -> Iterator[Events]:
+def _first(count: int, batches: Iterable[Events]) -> Iterator[Events]:
     """Yield the first events of a log; the last batch is cut."""
     left = count
     for batch in batches:
@@ -220,7 +249,7 @@ def _up_to(count: int, batches: Iterable[Events]) -> Iterator[Events]:
 def _watched(
     batches: Iterable[Events], total: int, watch: Callable[[int, int], None]
 ) -> Iterator[Events]:
-    """Say after each batch how far the run is."""
+    """Yield batches and report the progress after each."""
     done = 0
     for batch in batches:
         yield batch
@@ -229,7 +258,7 @@ def _watched(
 
 
 def _ended_by_count(batch: Events) -> Events:
-    """Let a phase that the clock or a person ended have ended by count."""
+    """Replace the status of phases that the clock or an interruption ended."""
     phases = batch[Kind.PHASE]
     if not len(phases):
         return batch

@@ -1,7 +1,7 @@
-"""Plan a recorded run again up to an instant, and go on from there.
+"""Plan a recorded run again up to an iteration, and continue from there.
 
-Planning is deterministic, so the state after an iteration is made by planning again up to there,
-and it is proved to be the recorded one by holding every event on the way against the recording.
+Planning is deterministic, so planning again restores the state after an iteration. Comparing every
+event on the way with the recording proves that it is the recorded state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,68 +12,150 @@ import numpy as np
 
 from brrt.comparison.events import first_difference
 from brrt.errors import BrrtError
-from brrt.events import Events
+from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.emit import EventLog
-from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelRun
+from brrt.planners import PLANNERS, make_planner
+from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelPlanner, KernelRun
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
-from brrt.runs.branch import Shared, called, loop_planner
+from brrt.recording import Recording
+from brrt.runs.run import Run, Solver, made_by
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
 
 
-def _at_start(
-    manifest: Manifest, problem: Problem, rng: np.random.Generator, log: EventLog
-) -> KernelRun:
-    """Begin to plan what a manifest says."""
-    return KernelRun(_retracing(manifest.stretches[0][1], problem), problem, rng, log)
+class RecordedRun(Run):
+    """A run with the robot, world, start and goal of a recording; the base of runs that repeat it.
+
+    Args:
+        recording: The recording.
+        manifest: Its manifest, or a part of it.
+        scenario: The settings of this run.
+        planner: The planner of this run.
+        batch: Events in a batch at most.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        manifest: Manifest,
+        scenario: Scenario,
+        planner: Solver,
+        batch: int,
+    ) -> None:
+        self._set_up(scenario, Problem.recorded(manifest, recording.world), planner, batch)
+        # A branch may have changed the seed.
+        self._rng = np.random.Generator(np.random.PCG64(manifest.stretches[0][1].seed))
 
 
-def _retracing(scenario: Scenario, problem: Problem) -> Kernel[Any]:
-    return loop_planner(scenario).retracing(problem)
+@dataclass(slots=True)
+class SharedEvents:
+    """The recorded events of planning up to the end of an iteration, without the end of planning.
+
+    Attributes:
+        recording: The recording.
+        iteration: The last iteration.
+        count: Number of these events, once they were read.
+        t: Time of the last of them in ns, once they were read.
+    """
+
+    recording: Recording
+    iteration: int
+    count: int = 0
+    t: int = 0
+
+    def __iter__(self) -> Iterator[Events]:
+        """Read them."""
+        self.count = self.t = 0
+        for batch in self.recording.batches():
+            end, _ = end_of_planning(batch)
+            part = batch.until(seq=end, iteration=self.iteration)
+            if len(part):
+                self.count, self.t = self.count + len(part), part.last.t
+                yield part
+            if len(part) < len(batch):
+                return
 
 
-def _retrace(
-    drive: KernelRun, manifest: Manifest, problem: Problem, log: EventLog, iteration: int
-) -> Iterator[Events]:
-    """Plan from the start of a run to the end of an iteration; yield what happens on the way."""
-    for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
-        yield from drive.go_on(Stop(iterations=UNLIMITED, draws=branch.iteration))
-        drive.switch_settings(_retracing(after, problem), branch.seed)
-    yield from drive.go_on(Stop(iterations=UNLIMITED, draws=iteration))
-    yield log.drain()
+def end_of_planning(batch: Events) -> tuple[int | None, Status | None]:
+    """Return the number of the event before planning ended, and how it ended, if it did."""
+    phases = batch[Kind.PHASE]
+    ends = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)]
+    return (int(ends["seq"][0]) - 1, Status(int(ends["status"][0]))) if len(ends) else (None, None)
 
 
-def proved(
-    shared: Shared,
+def name_of(recording: Recording) -> str:
+    """Name a recording in messages."""
+    return recording.name or "the recording"
+
+
+def kernel_planner(scenario: Scenario) -> KernelPlanner:
+    """Make a scenario's planner, which must be one that can change settings between iterations.
+
+    Raises:
+        BrrtError: It cannot, or is not registered.
+    """
+    if scenario.planner not in PLANNERS:
+        raise BrrtError(
+            f"planner {scenario.planner} is not registered, so its runs cannot be continued"
+        )
+    planner = make_planner(scenario)
+    if not isinstance(planner, KernelPlanner):
+        raise BrrtError(
+            f"planner {scenario.planner} is not a KernelPlanner, so its runs cannot be continued: "
+            "plan from the start with other settings"
+        )
+    return planner
+
+
+def restored(
+    shared: SharedEvents,
     before: Manifest,
     problem: Problem,
     rng: np.random.Generator,
     log: EventLog,
-    made_by: Mapping[str, str],
 ) -> KernelRun:
-    """Plan again up to the branch; return what plans, in the state that was recorded.
+    """Plan again up to the last shared iteration and return the planner in that state.
 
     Args:
         shared: The recorded events up to there.
-        before: What ruled up to there.
+        before: The manifest up to there.
         problem: Robot, world, start and goal.
-        rng: Every random draw comes from here.
+        rng: Source of all random draws.
         log: Numbers and times the events.
-        made_by: The versions here, to be named beside the recorded ones.
 
     Raises:
-        BrrtError: An event is not the recorded one.
+        BrrtError: An event differs from the recorded one.
     """
-    drive = _at_start(before, problem, rng, log)
-    again = _retrace(drive, before, problem, log, shared.iteration)
-    found = first_difference(shared, again)
+    run = _started(before, problem, rng, log)
+    found = first_difference(shared, _replan(run, before, problem, log, shared.iteration))
     if found is not None:
         raise BrrtError(
-            f"{called(shared.recorded)}: planned again, the run parts from its recording at "
-            f"{found} (recorded against planned); {_versions(before.made_by, made_by)}"
+            f"{name_of(shared.recording)}: planned again, the run differs from its recording at "
+            f"{found} (recorded against planned); {_versions(before.made_by, made_by())}"
         )
-    return drive
+    return run
+
+
+def _started(
+    manifest: Manifest, problem: Problem, rng: np.random.Generator, log: EventLog
+) -> KernelRun:
+    return KernelRun(_replan_kernel(manifest.stretches[0][1], problem), problem, rng, log)
+
+
+def _replan_kernel(scenario: Scenario, problem: Problem) -> Kernel[Any]:
+    return kernel_planner(scenario).retracing(problem)
+
+
+def _replan(
+    run: KernelRun, manifest: Manifest, problem: Problem, log: EventLog, iteration: int
+) -> Iterator[Events]:
+    """Plan to the end of an iteration, with the settings of each stretch of the manifest."""
+    for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
+        yield from run.go_on(Stop(iterations=UNLIMITED, draws=branch.iteration))
+        run.switch_settings(_replan_kernel(after, problem), branch.seed)
+    yield from run.go_on(Stop(iterations=UNLIMITED, draws=iteration))
+    yield log.drain()
 
 
 def _versions(then: Mapping[str, str], now: Mapping[str, str]) -> str:
@@ -87,16 +169,16 @@ def _versions(then: Mapping[str, str], now: Mapping[str, str]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Onward:
-    """Plans on from a state that was proved to be the recorded one; a solver, see `Planner.solve`.
+class Continuation:
+    """Continues planning from a restored state; a solver, see `Planner.solve`.
 
     Attributes:
-        drive: What plans, at the branch.
+        run: The planner in the restored state.
         shared: The recorded events up to there.
     """
 
-    drive: KernelRun
-    shared: Shared
+    run: KernelRun
+    shared: SharedEvents
 
     def solve(
         self,
@@ -105,15 +187,15 @@ class Onward:
         log: EventLog,
         stop: Stop,
     ) -> Iterator[Events]:
-        """Yield what was recorded, then what happens from there on."""
+        """Yield the recorded events, then those of this run."""
         yield from self.shared
         log.resume(self.shared.t)
-        yield from self.drive.finish(stop)
+        yield from self.run.finish(stop)
 
 
 @dataclass(frozen=True, slots=True)
-class Anew:
-    """Plans what a manifest with branches says, from the start; a solver, see `Planner.solve`.
+class BranchedPlan:
+    """Plans from the start what a manifest with branches states; a solver, see `Planner.solve`.
 
     Attributes:
         manifest: The manifest.
@@ -124,10 +206,10 @@ class Anew:
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
-        """Yield everything that happens."""
+        """Yield all events."""
         *earlier, last = self.manifest.branches
         before = replace(self.manifest, branches=tuple(earlier), scenario=last.scenario)
-        drive = _at_start(before, problem, rng, log)
-        yield from _retrace(drive, before, problem, log, last.iteration)
-        drive.switch_settings(loop_planner(self.manifest.scenario).loop(problem, stop), last.seed)
-        yield from drive.finish(stop)
+        run = _started(before, problem, rng, log)
+        yield from _replan(run, before, problem, log, last.iteration)
+        run.switch_settings(kernel_planner(self.manifest.scenario).loop(problem, stop), last.seed)
+        yield from run.finish(stop)

@@ -1,4 +1,4 @@
-"""Drive a planner: plan, smooth, and hand every event to the sinks."""
+"""Run a scenario: plan, smooth, execute, and pass every event to the sinks."""
 
 import platform
 import sys
@@ -27,10 +27,12 @@ from brrt.validate import check_possible
 from brrt.worlds.world import World
 
 _SWITCH_S = 0.0005
+"""Switch interval of threads during a run: between two batches the planner must not wait for a sink's
+thread for the usual 5 ms."""
 
 
 class Solver(Protocol):
-    """What a planner has to have; `Planner` is a base class that checks settings too."""
+    """What every planner has; the base class `Planner` adds settings that check themselves."""
 
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
@@ -39,21 +41,20 @@ class Solver(Protocol):
 
 
 class Run:
-    """A scenario that has been found sound, ready to go once.
+    """A checked scenario, ready to run once.
 
     Args:
         scenario: What to run.
-        world: A world at hand, as one made by hand; the scenario's `world` is then its name in the
-            log. By default the scenario makes its own.
-        planner: A planner of your own, any object with `Planner.solve`; the scenario's `planner`
-            is then its name in the log. By default the registered one of that name.
+        world: The world, instead of the one that the scenario names.
+        planner: Any object with the method `Planner.solve`, and optionally `Planner.contract`,
+            instead of the registered planner; the scenario's `planner` is its name.
         batch: Events in a batch at most; the log does not depend on it.
 
     Raises:
-        BrrtError: The scenario is of no use; nothing has been written anywhere.
+        BrrtError: The scenario cannot be run; nothing has been written.
     """
 
-    _stranger = False  # whose events are looked at, since somebody else's code emits them
+    _foreign = False  # whether the planner is not registered, so that its events are checked
 
     def __init__(
         self,
@@ -67,12 +68,12 @@ class Run:
             scenario = replace(scenario, world=world.name)
         if planner is not None:
             scenario = _named(scenario, planner)
-            self._stranger = type(planner) not in PLANNERS.values()
+            self._foreign = type(planner) not in PLANNERS.values()
         solver = make_planner(scenario) if planner is None else planner
         self._set_up(scenario, Problem.of(scenario, world), solver, batch)
 
     def _set_up(self, scenario: Scenario, problem: Problem, planner: Solver, batch: int) -> None:
-        """Make ready all that `events` needs."""
+        """Prepare everything that `events` needs."""
         scenario = check_params(scenario)
         self._planner, self.problem = planner, problem
         self._smoother = Shortcut(attempts=scenario.shortcuts) if scenario.smooth else None
@@ -80,7 +81,7 @@ class Run:
         self._compile()
         self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
         self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
-        self._gone = False
+        self._ran = False
         self.stop = make_stop(scenario)
         self.manifest = Manifest(
             scenario=scenario,
@@ -95,7 +96,7 @@ class Run:
         )
 
     def _compile(self) -> None:
-        """Load the kernels, or compile them: one iteration, before the run's clock starts."""
+        """Load or compile the kernels by one iteration, before the run's clock starts."""
         problem, stop = self.problem, Stop(iterations=1)
         rng, log = np.random.Generator(np.random.PCG64(0)), EventLog(problem.dof, 4096)
         for _ in self._planner.solve(problem, rng, log, stop):
@@ -109,23 +110,25 @@ class Run:
                 pass
 
     def events(self) -> Iterator[Events]:
-        """Plan, smooth, drive; yield what happens, in batches.
+        """Plan, smooth and execute; yield the events in batches.
 
         Raises:
-            BrrtError: The run has gone already, or a planner of your own emits what no event can
-                say, as a phase of its own.
+            BrrtError: The run was made before, or a planner that is not registered emits an
+                impossible event, such as an unknown phase.
         """
-        if self._gone:
-            raise BrrtError("a run goes once; make another brrt.Run(scenario) to run it again")
-        self._gone = True
+        if self._ran:
+            raise BrrtError(
+                "a run can be made once; make another brrt.Run(scenario) to run it again"
+            )
+        self._ran = True
         path, moved, iteration, count = None, False, 0, 0
         for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):
             count += len(batch)
-            if self._stranger:
+            if self._foreign:
                 check_possible(batch, count)
             path = _last_path(batch, path)
             moved = moved or Kind.MOVE in batch.counts
-            # A planner may have gone on after its path; the count never falls.
+            # A planner may continue after its path; iterations never decrease.
             iteration = max(iteration, batch.last.iteration)
             yield batch
         if path is None:
@@ -137,25 +140,24 @@ class Run:
             ):
                 waypoints = _last_path(batch, path)["waypoints"]
                 yield batch
-        # A planner that moves as it plans has driven its path by now.
+        # A planner that moves while it plans has reached the goal by now.
         if self._execute is not None and not moved and not self.stop.interrupted:
             yield from self._execute.drive(waypoints, space, self._log, self.stop, iteration)
 
     def execute(
         self, sinks: Iterable[Sink] = (), watch: Callable[[Metrics], None] | None = None
     ) -> Metrics:
-        """Run to the end, feeding the sinks; they are closed whatever happens.
+        """Run to the end and pass the events to the sinks, which are closed in any case.
 
         Args:
             sinks: Where the events go.
-            watch: Called with the figures so far after each batch.
+            watch: Called with the metrics so far after each batch.
         """
         sinks = list(sinks)
         metrics = Metrics(self.manifest)
         result: Result | None = None
-        patience = sys.getswitchinterval()
+        usual = sys.getswitchinterval()
         try:
-            # Between two batches the planner must not wait 5 ms for a recorder to let go.
             sys.setswitchinterval(_SWITCH_S)
             for batch in self.events():
                 for sink in sinks:
@@ -165,7 +167,7 @@ class Run:
                     watch(metrics)
             result = metrics.as_dict()
         finally:
-            sys.setswitchinterval(patience)
+            sys.setswitchinterval(usual)
             _close_all(sinks, result)
         return metrics
 
@@ -177,10 +179,10 @@ class Run:
 
 
 def _named(scenario: Scenario, planner: Solver) -> Scenario:
-    """Return the scenario as the log of somebody's own planner states it.
+    """Return the scenario with the settings of a given planner.
 
     Raises:
-        BrrtError: The name is that of a registered planner, which would be blamed for this one.
+        BrrtError: The name is that of another, registered planner.
     """
     own = PLANNERS.get(scenario.planner)
     if own is not None and not isinstance(planner, own):
@@ -192,12 +194,12 @@ def _named(scenario: Scenario, planner: Solver) -> Scenario:
 
 
 def _last_path(batch: Events, before: Any) -> Any:
-    """Return the batch's last event of kind path, or the one before where it has none."""
+    """Return the last path of a batch, or the one before if the batch has none."""
     return batch[Kind.PATH][-1] if Kind.PATH in batch.counts else before
 
 
 def _close_all(sinks: list[Sink], result: Result | None) -> None:
-    """Close every sink, even if one of them fails."""
+    """Close every sink, even if one fails."""
     if sinks:
         try:
             sinks[0].close(result)
@@ -207,7 +209,7 @@ def _close_all(sinks: list[Sink], result: Result | None) -> None:
 
 @cache
 def made_by() -> dict[str, str]:
-    """Versions of brrt and of what decides its numbers, and the platform."""
+    """Versions of brrt and of everything that affects its numbers, and the platform."""
     names = {name: version(name) for name in ("brrt", "numpy", "numba", "llvmlite")}
     return {
         **names,

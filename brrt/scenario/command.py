@@ -1,4 +1,4 @@
-"""Settings as the words of the command that plans by them."""
+"""Scenarios as `brrt plan` commands."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -8,12 +8,12 @@ from brrt.scenario.scenario import Scenario
 
 
 def command(scenario: Scenario, out: str = "next.mcap") -> str:
-    """Write a scenario as the command that runs it, and records to `out`."""
+    """Return the command that runs a scenario and records it to `out`."""
     return shlex.join([*plan_words(scenario), "--out", out])
 
 
 def plan_words(scenario: Scenario) -> list[str]:
-    """Write a scenario as the command that runs it, but for what it writes."""
+    """Return the words of the command that runs a scenario, without its outputs."""
     values, usual = scenario.as_dict(), Scenario().as_dict()
     given = {
         name: values[name]
@@ -24,7 +24,7 @@ def plan_words(scenario: Scenario) -> list[str]:
 
 
 def setting_words(settings: Mapping[str, Any], params: Mapping[str, Any]) -> list[str]:
-    """Write fields of a scenario, and parameters of its planner, as options."""
+    """Return the options for fields of a scenario and parameters of its planner."""
     words = list(_options(settings))
     for name, value in params.items():
         if value is not None:
@@ -38,7 +38,7 @@ def _options(values: Mapping[str, Any]) -> Iterator[str]:
         if name in values:
             given = text(values[name])
             option = f"--{name.replace('_', '-')}"
-            # A value that begins with a minus would be taken for an option.
+            # A separate word that begins with a minus would be read as an option.
             yield from [f"{option}={given}"] if given.startswith("-") else [option, given]
     for name in ("smooth", "execute"):
         if name in values:
@@ -46,7 +46,7 @@ def _options(values: Mapping[str, Any]) -> Iterator[str]:
 
 
 def text(value: Any) -> str:
-    """Write a value as the command line reads it: numbers as short as they are exact."""
+    """Return a value as the command line reads it: numbers as short as exactness allows."""
     if isinstance(value, list | tuple):
         return ",".join(text(x) for x in value)
     if isinstance(value, bool):

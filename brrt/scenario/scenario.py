@@ -1,4 +1,4 @@
-"""A scenario: everything that decides what a run does, as a user writes it and a file keeps it."""
+"""A scenario: everything that determines a run, as users write it and files store it."""
 
 import tomllib
 from collections.abc import Mapping
@@ -13,10 +13,10 @@ from brrt.robots import Robot, make_robot, names_robot_file
 from brrt.worlds import world_beside
 
 RANDOM: Literal["random"] = "random"
-"""A start or goal that the scenario's seed decides."""
+"""A start or goal that is drawn from the scenario's seed."""
 
 MOST = 10**15
-"""Above any count that a run could reach, and well within 64 bits."""
+"""More than any count of a run; fits into 64 bits."""
 
 DEFAULT_ITERATIONS = 1_000_000
 """Iterations of a run without a budget, unless its planner has another default."""
@@ -30,21 +30,23 @@ class Scenario:
         world: A generator with parameters (`circles2d:n=50`) or a file.
         robot: A robot with parameters (`polygon:length=4`) or a file.
         planner: Name of a planner.
-        params: The planner's settings where they differ from its defaults.
+        params: The planner's settings; the others have its defaults. A scenario does not check
+            them, `brrt.planners.check_params` does.
         start: First configuration, or `random`; the world's own by default.
         goal: Last configuration, or `random`; the world's own by default.
-        seed: Seed of every random draw of the planner and the smoother, and of a random start or
-            goal, which have streams of their own: whatever else is random stays as it is.
-        iterations: Iterations that the planner may make; by default as many as there is time for
-            or, without a limit of time, the planner's own default.
-        draws: Draws that it may make, whether they count as iterations or not; for a re-run.
-        time: Seconds that it may take.
-        smooth: Shortcut the path once there is one.
+        seed: Seed of the draws of planner and smoother. A random start and goal are drawn from
+            generators of their own, so the other draws do not depend on them.
+        iterations: Limit of the planner's iterations; by default none if `time` is given, and
+            otherwise the planner's default.
+        draws: Limit of its draws, including those that do not count as iterations; used to
+            reproduce a run.
+        time: Limit of its time in seconds.
+        smooth: Shortcut the path.
         shortcuts: Attempts of the smoother.
-        execute: Drive the path in moves, as the real-time mode of the field has it.
+        execute: Execute the path in moves, one in each deadline.
         max_move: Longest move, in the robot's metric.
         deadline: Seconds for each move.
-        clock: `real`, or `logical`: event n at n us, so that files are equal byte by byte.
+        clock: `real`, or `logical`: event n at n us, so that equal runs give equal files.
     """
 
     world: str = "circles2d"
@@ -65,7 +67,7 @@ class Scenario:
     clock: Literal["real", "logical"] = "real"
 
     def __post_init__(self) -> None:
-        """Check what can be checked without making the world.
+        """Check what can be checked without world and planner.
 
         Raises:
             BrrtError: A name is unknown or a number out of range.
@@ -100,7 +102,7 @@ class Scenario:
         """Make a scenario from named values, as from TOML or a manifest.
 
         Raises:
-            BrrtError: A name is unknown or a value of no use.
+            BrrtError: A name is unknown or a value is wrong.
         """
         if not isinstance(values, Mapping):
             raise BrrtError("a scenario must be a table of names and values")
@@ -129,7 +131,7 @@ class Scenario:
             raise BrrtError(f"{path}: {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise BrrtError(f"{path}: not TOML: {error}") from None
-        # A map or a robot named in the file is looked for beside it first.
+        # Files of the world and the robot are relative to this file.
         world, robot = values.get("world"), values.get("robot")
         if isinstance(world, str):
             values["world"] = world_beside(path.parent, world)
@@ -145,10 +147,10 @@ class Scenario:
         return asdict(self)
 
     def iteration_limit(self, default: int = DEFAULT_ITERATIONS) -> int:
-        """Return how many iterations the planner may make; `MOST` where only time is limited.
+        """Return the limit of the planner's iterations; `MOST` if only its time is limited.
 
         Args:
-            default: The planner's own limit, for runs without a budget.
+            default: The planner's default, for a run without a budget.
         """
         usual = MOST if self.time is not None else default
         return usual if self.iterations is None else self.iterations
@@ -163,7 +165,7 @@ class Scenario:
 
 
 def _robot(spec: str) -> str:
-    """Return the name of a robot, so that a file's is known for one even when the file is gone.
+    """Return a robot's specification; a file's is marked as one, even if it does not exist.
 
     Raises:
         BrrtError: There is no such robot.

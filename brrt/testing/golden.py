@@ -13,7 +13,7 @@ from brrt.formats import McapSink, read
 from brrt.planners import PLANNERS, load_scenario
 from brrt.recording import Memory, Recording
 from brrt.replay.metrics import Metrics, metrics
-from brrt.runs.branched import RepeatedRun
+from brrt.runs.reproduce import ReproducedRun
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 
@@ -72,7 +72,7 @@ def again(path: Path) -> Run:
     planner = kept.manifest.scenario.planner
     if planner not in PLANNERS:
         raise BrrtError(f"{path}: planner {planner} is not brrt's own; give the run as well")
-    return RepeatedRun(kept.manifest, kept.world)
+    return ReproducedRun(kept)
 
 
 def save(recording: Recording, path: Path) -> None:

@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 
 from brrt import McapSink, Memory, Run, Scenario, check, first_difference, read
 from brrt.formats.background import Background
-from brrt.runs.branched import BranchedRun
+from brrt.runs.branch import BranchedRun
 from brrt.views.rerun.sink import RerunSink
 from tests.conftest import Result
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status
 from brrt.planners import make_planner
-from brrt.runs.branched import with_stop_at
+from brrt.runs.reproduce import stopped_at
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 from brrt.worlds import World
@@ -470,7 +470,7 @@ def test_an_interrupted_run_is_the_beginning_of_the_whole(batch: int, seed: int,
     check_log(log)
     if status(log) is Status.INTERRUPTED:
         if len(log[Kind.SAMPLE]):
-            again = planned(with_stop_at(scenario, len(log[Kind.SAMPLE])))[1]
+            again = planned(stopped_at(scenario, len(log[Kind.SAMPLE])))[1]
             for events in (log, again):
                 events[Kind.PHASE]["status"][-1] = Status.INTERRUPTED
             naive.assert_same(log, again)

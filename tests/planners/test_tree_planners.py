@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from brrt.events import Events, Kind, Source, Stage, Status
 from brrt.kernels import forest
-from brrt.runs.branched import with_stop_at
+from brrt.runs.reproduce import stopped_at
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
 from brrt.worlds import World
@@ -131,7 +131,7 @@ def test_a_shorter_run_is_the_beginning_of_a_longer_one(
     if drawn < 2:
         return
     cut = data.draw(st.integers(1, drawn - 1))
-    for shorter in (replace(scenario, iterations=cut), with_stop_at(scenario, cut)):
+    for shorter in (replace(scenario, iterations=cut), stopped_at(scenario, cut)):
         _, part = planned(shorter)
         assert status(part) is Status.ITERATION_LIMIT
         assert column(part, "iteration")[-1] == cut
@@ -241,7 +241,7 @@ def test_a_time_budget_ends_the_run(planner: str, params: dict[str, Any], walled
     assert status(events) is Status.TIME_LIMIT
     check_log(events)
     assert 0.03e9 <= np.diff(events[Kind.PHASE]["t"])[0] < 10e9
-    again = planned(with_stop_at(run.manifest.scenario, len(events[Kind.SAMPLE])))[1]
+    again = planned(stopped_at(run.manifest.scenario, len(events[Kind.SAMPLE])))[1]
     for log in (events, again):
         log[Kind.PHASE]["status"][-1] = Status.TIME_LIMIT
         for table in log.tables.values():
@@ -266,7 +266,7 @@ def test_an_interrupted_run_is_the_beginning_of_the_whole(
     _, whole = planned(scenario)
     naive.assert_same(without_end(log), whole.until(seq=len(log) - 2))
     if status(log) is Status.INTERRUPTED and len(log[Kind.SAMPLE]):
-        again = planned(with_stop_at(scenario, len(log[Kind.SAMPLE])))[1]
+        again = planned(stopped_at(scenario, len(log[Kind.SAMPLE])))[1]
         naive.assert_same(without_end(log), without_end(again))
     else:
         assert status(log) in (Status.INTERRUPTED, status(whole))

@@ -16,14 +16,14 @@ from brrt import (
     Kind,
     McapSink,
     Recording,
-    RepeatedRun,
+    ReproducedRun,
     Scenario,
     check,
     first_difference,
     read,
 )  # fmt: skip
 from brrt.events import Events, Phase, Status
-from brrt.runs.branch import last_whole_iteration
+from brrt.runs.branch import last_complete_iteration
 from brrt.runs.run import Run
 from brrt.scenario.manifest import Manifest
 from tests.conftest import Result, recorded
@@ -108,7 +108,7 @@ def test_a_change_holds_from_the_branch_on(
     manifest = Manifest.from_strings(run.manifest.to_strings())
     assert manifest == run.manifest
     assert check(manifest, recording.world, events) == []
-    again = RepeatedRun(manifest, recording.world)
+    again = ReproducedRun(replace(recording, manifest=manifest))
     assert first_difference([events], again.events()) is None
 
 
@@ -142,7 +142,12 @@ def test_a_branch_of_a_branch() -> None:
         assert check(run.manifest, world, events) == []
         one_step = replace(run.manifest, branches=())
         assert check(one_step, world, events)
-        assert first_difference([events], RepeatedRun(run.manifest, world).events()) is None
+        assert (
+            first_difference(
+                [events], ReproducedRun(replace(recording, manifest=run.manifest)).events()
+            )
+            is None
+        )
         recording = Recording(run.manifest, world, lambda e=events: iter([e]), None)  # type: ignore[misc]
     steps = [scenario.params["step"] for _, scenario in recording.manifest.stretches]
     assert steps == [5.0, 3.0, 2.0, 1.0]
@@ -177,7 +182,7 @@ def test_the_last_iteration_that_was_over(scenario: Scenario, data: st.DataObjec
     seq = data.draw(st.integers(0, len(log) - 1))
     cut = data.draw(st.integers(0, len(log) - 1))
     batches = [log.until(seq=cut), naive_rest(log, cut)]
-    found, ended = last_whole_iteration(batches, {"seq": seq})
+    found, ended = last_complete_iteration(batches, {"seq": seq})
     over = iterations[seq] if iterations[seq + 1 : seq + 2] != [iterations[seq]] else None
     phases = log[Kind.PHASE]
     end = int(phases["seq"][phases["status"] != Status.BEGIN][0])
@@ -234,7 +239,7 @@ def test_what_cannot_be() -> None:
         with pytest.raises(BrrtError, match=message):
             BranchedRun(wrong)
     foreign = replace(recording.manifest, scenario=Scenario(planner="dogleg"))
-    with pytest.raises(BrrtError, match="dogleg is not known here"):
+    with pytest.raises(BrrtError, match="dogleg is not registered"):
         BranchedRun(replace(recording, manifest=foreign), iteration=3)
 
 
@@ -326,5 +331,5 @@ def test_a_run_goes_once() -> None:
     """Its generator and its log have gone on, so a second time it would be another run."""
     run = Run(plain("circles2d:n=20,seed=3", iterations=50))
     run.execute([])
-    with pytest.raises(BrrtError, match=r"goes once; make another brrt\.Run\(scenario\)"):
+    with pytest.raises(BrrtError, match=r"made once; make another brrt\.Run\(scenario\)"):
         run.execute([])

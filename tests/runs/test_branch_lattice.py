@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrt import BranchedRun, BrrtError, Kind, Recording, RepeatedRun, Scenario, check
+from brrt import BranchedRun, BrrtError, Kind, Recording, ReproducedRun, Scenario, check
 from brrt import first_difference as parting
 from brrt.events import Phase, Status
 from tests.planners.test_rrt import status
@@ -66,7 +66,10 @@ def test_a_change_holds_from_the_branch_on(
         shared = run.manifest.branches[-1].events
         naive.assert_same(recording.events().until(seq=shared - 1), events.until(seq=shared - 1))
         assert check(run.manifest, recording.world, events) == []
-        assert parting([events], RepeatedRun(run.manifest, recording.world).events()) is None
+        assert (
+            parting([events], ReproducedRun(replace(recording, manifest=run.manifest)).events())
+            is None
+        )
         recording = Recording(run.manifest, recording.world, lambda e=events: iter([e]), None)  # type: ignore[misc]
         last = last_open(events) - 1
         how = {"params": {"lookahead": 2} if params else {}}

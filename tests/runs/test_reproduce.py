@@ -12,11 +12,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from brrt import BrrtError, Events, Kind, McapSink, Run, Scenario, World, plan_again, read
+from brrt import (
+    BrrtError,
+    Events,
+    Kind,
+    McapSink,
+    Recording,
+    Reproduction,
+    Run,
+    Scenario,
+    World,
+    read,
+    reproduce,
+)
 from brrt.events import Phase, Status
 from brrt.planners import make_stop
-from brrt.runs.branched import with_stop_at
-from brrt.runs.reproduce import Again
+from brrt.runs.reproduce import stopped_at
 from tests.conftest import Result, recorded, result_of
 from tests.support.logs import split
 
@@ -32,16 +43,16 @@ PLANNERS = {
 }
 
 
-def again(run: Run, batches: list[Events], **options: Any) -> Again:
-    """Plan a run again."""
-    return plan_again(run.manifest, run.problem.world, lambda: iter(batches), **options)
+def again(run: Run, batches: list[Events], **options: Any) -> Reproduction:
+    """Reproduce a run."""
+    return reproduce(Recording(run.manifest, run.problem.world, lambda: batches), **options)
 
 
 @pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.mcap")), ids=lambda p: p.stem)
 def test_golden_recordings(path: Path) -> None:
     """Each golden recording is planned again to the last bit."""
     recording = read(path)
-    found = plan_again(recording.manifest, recording.world, recording.batches)
+    found = reproduce(recording)
     assert found.equal
     assert found.ended == ""
     assert recording.result is not None
@@ -142,7 +153,7 @@ def test_a_missing_phase_is_only_somebodys_doing() -> None:
     smoothing = int(log[Kind.PHASE]["seq"][2])
     found = again(run, [log.until(seq=smoothing - 1)])
     assert found.equal
-    assert "ahead of the phase smooth" in found.ended
+    assert "interrupted before the phase smooth" in found.ended
     shorter = Run(replace(PLAIN, smooth=False, execute=False))
     assert not again(shorter, [log]).equal
 
@@ -151,7 +162,7 @@ def test_other_versions_are_told() -> None:
     """What was made elsewhere is named, and is no difference."""
     run, log = recorded(PLAIN)
     manifest = replace(run.manifest, made_by={**run.manifest.made_by, "numpy": "1.0"})
-    found = plan_again(manifest, run.problem.world, lambda: iter([log]))
+    found = reproduce(Recording(manifest, run.problem.world, lambda: [log]))
     assert found.equal
     (row,) = found.versions
     assert (row.name, row.a) == ("numpy", "1.0")
@@ -188,7 +199,7 @@ def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
     unknown = brrt("verify", foreign(tmp_path), "--rerun")
     assert unknown.code == 2
     assert unknown.err.strip().count("\n") == 0
-    assert "somebodys is not known here" in unknown.err
+    assert "somebodys is not registered" in unknown.err
 
 
 def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
@@ -206,7 +217,7 @@ def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: 
 def test_a_stop_beyond_the_default() -> None:
     """A run that made more iterations in its time than it makes by default ends where it did."""
     scenario = replace(PLAIN, time=5.0)
-    stop = make_stop(with_stop_at(scenario, 3_000_000))
+    stop = make_stop(stopped_at(scenario, 3_000_000))
     assert stop.draws == 3_000_000
     assert stop.iterations > 3_000_000
     assert stop.time_s is None
@@ -215,5 +226,5 @@ def test_a_stop_beyond_the_default() -> None:
 def test_planners_that_are_not_known(tmp_path: Path) -> None:
     """From Python it is an error as well."""
     recording = read(foreign(tmp_path))
-    with pytest.raises(BrrtError, match="is not known here"):
-        plan_again(recording.manifest, recording.world, recording.batches)
+    with pytest.raises(BrrtError, match="somebodys is not registered"):
+        reproduce(recording)
