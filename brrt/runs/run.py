@@ -27,8 +27,8 @@ from brrt.validate import check_possible
 from brrt.worlds.world import World
 
 _SWITCH_S = 0.0005
-"""Switch interval of threads during a run: between two batches the planner must not wait for a sink's
-thread for the usual 5 ms."""
+"""Switch interval of threads during a run: between two batches the planner must not wait 5 ms,
+Python's usual interval, for the thread of a sink."""
 
 
 class Solver(Protocol):
@@ -118,7 +118,7 @@ class Run:
         """
         if self._ran:
             raise BrrtError(
-                "a run can be made once; make another brrt.Run(scenario) to run it again"
+                "a run is made once; make another brrt.Run(scenario) to repeat it"
             )
         self._ran = True
         path, moved, iteration, count = None, False, 0, 0
