@@ -117,9 +117,7 @@ class Run:
                 impossible event, such as an unknown phase.
         """
         if self._ran:
-            raise BrrtError(
-                "a run is made once; make another brrt.Run(scenario) to repeat it"
-            )
+            raise BrrtError("a run is made once; make another brrt.Run(scenario) to repeat it")
         self._ran = True
         path, moved, iteration, count = None, False, 0, 0
         for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):

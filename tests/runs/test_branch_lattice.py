@@ -117,7 +117,9 @@ def test_what_cannot_be() -> None:
     """What the lattice was laid by stays; a proof and an optimum are the end."""
     recording, _ = parent(CAVE)
     for name, value in {"epsilon": 1.0, "diagonals": True, "max_move": 9.0}.items():
-        with pytest.raises(BrrtError, match=f"{name} cannot change to {value} at a branch: the lattice"):
+        with pytest.raises(
+            BrrtError, match=f"{name} cannot change to {value} at a branch: the lattice"
+        ):
             BranchedRun(recording, iteration=3, params={name: value})
     shortest, _ = parent(replace(CAVE, planner="a-star"))
     with pytest.raises(BrrtError, match=r"ended with its path at .* \(--at-iteration\)$"):
