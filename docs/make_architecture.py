@@ -27,9 +27,9 @@ WIDTH, HEIGHT, BOX, ROW, COLUMN = 860, 640, (190, 34), 54, 290
 
 def package_of(module: str) -> str | None:
     """Return the box that a module of brrt or of the command line is drawn in."""
-    if module.split(".")[0] == "cli":
-        return "cli"
     parts = module.split(".")
+    if parts[0] == "cli":
+        return "cli"
     if len(parts) < 2:
         return None
     name = parts[1]
@@ -80,9 +80,9 @@ def reduced(edges: set[tuple[str, str]]) -> set[tuple[str, str]]:
 def picture() -> str:
     """Return the picture as SVG."""
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}"',
         'font-family="sans-serif" font-size="15">',
-        '<defs><marker id="a" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" '
+        '<defs><marker id="a" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8"',
         'markerHeight="8" orient="auto"><path d="M0 0L8 4L0 8z" fill="#555"/></marker></defs>',
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
     ]
@@ -97,12 +97,12 @@ def picture() -> str:
         )
     for group, colour in COLOURS:
         for name in group:
-            x, y = middle(name)
-            width = max(BOX[0] - 60, 9 * len(name))
+            at, up = middle(name)
+            wide = max(BOX[0] - 60, 9 * len(name))
             parts.append(
-                f'<rect x="{x - width / 2:.0f}" y="{y - BOX[1] / 2:.0f}" width="{width}" '
+                f'<rect x="{at - wide / 2:.0f}" y="{up - BOX[1] / 2:.0f}" width="{wide}" '
                 f'height="{BOX[1]}" rx="5" fill="{colour}" stroke="#888"/>'
-                f'<text x="{x:.0f}" y="{y + 5:.0f}" text-anchor="middle">{name}</text>'
+                f'<text x="{at:.0f}" y="{up + 5:.0f}" text-anchor="middle">{name}</text>'
             )
     return "\n".join([*parts, "</svg>", ""])
 
