@@ -102,7 +102,7 @@ def replay(
         _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
         return
     metrics = Metrics(recording.manifest)
-    trees = TreeStats()
+    trees = TreeStats(recording.robot().distance)
     recent = [] if at_event is None else [RecentEvents()]
     told = Transcript(recording.manifest, recording.robot()) if text else None
     folds: list[Any] = [told] if told else [] if as_json else [trees, *recent]

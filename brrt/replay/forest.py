@@ -9,16 +9,17 @@ from numpy.typing import NDArray
 
 from brrt.errors import LogError
 from brrt.events import Events, Kind, Table
-from brrt.replay.ledger import (
-    CIRCLE,
+from brrt.replay.tree_fold import (
+    CYCLE,
     NO_NODE,
     NO_PARENT,
-    SOUND,
-    Changes,
+    VALID,
     Distance,
-    changes,
-    edge_lengths,
-    fold,
+    TreeChanges,
+    fold_costs,
+    of_tree,
+    sum_lengths,
+    trees_in,
 )
 
 _BLOCK = 1 << 13
@@ -46,7 +47,7 @@ class Tree:
 
     @property
     def leaves(self) -> int:
-        """Nodes that are nobody's parent."""
+        """Nodes without children."""
         return leaves_of(self.parent)
 
     @property
@@ -72,7 +73,7 @@ class Tree:
         while self.parent[lineage[-1]] >= 0:
             above = int(self.parent[lineage[-1]])
             if above >= len(self):
-                raise LogError(f"node {lineage[-1]} has the parent {above}, which is not there")
+                raise LogError(f"node {lineage[-1]} has the parent {above}, which does not exist")
             lineage.append(above)
             if len(lineage) > len(self):
                 raise LogError(f"node {node} is its own ancestor")
@@ -100,20 +101,29 @@ class Tree:
 
 
 def leaves_of(parent: NDArray[np.signedinteger[Any]]) -> int:
-    """Count the nodes that are nobody's parent, shape (n,)."""
+    """Count the nodes without children; `parent` has shape (n,)."""
     has_child = np.zeros(len(parent), np.bool_)
     has_child[parent[parent >= 0]] = True
     return len(parent) - int(has_child.sum())
 
 
 def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
-    """Count the edges from the root to the deepest node, shape (n,).
+    """Count the edges from the root to the deepest node; `parent` has shape (n,).
 
     Raises:
         LogError: A node is its own ancestor.
     """
     if (parent < np.arange(len(parent))).all():
         return _depth_in_order(parent)
+    return int(depths(parent).max(initial=0))
+
+
+def depths(parent: NDArray[np.signedinteger[Any]]) -> NDArray[np.int64]:
+    """Count the edges from the root to each node, shape (n,).
+
+    Raises:
+        LogError: A node is its own ancestor.
+    """
     up = parent.copy()
     # Each round halves what is left of every way up: log2(depth) rounds.
     steps = (up >= 0).astype(np.int64)
@@ -124,11 +134,11 @@ def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
         up[on_way] = up[above]
         if steps.max() > len(parent):
             raise LogError("a node is its own ancestor")
-    return int(steps.max(initial=0))
+    return steps
 
 
 def _depth_in_order(parent: NDArray[np.signedinteger[Any]]) -> int:
-    """Do the same where parents come before their children, in blocks that a cache can hold."""
+    """Do the same where parents precede their children, in blocks that fit into a cache."""
     depth = np.empty(len(parent), np.int32)
     for first in range(0, len(parent), _BLOCK):
         outside = parent[first : first + _BLOCK]
@@ -146,46 +156,78 @@ def _depth_in_order(parent: NDArray[np.signedinteger[Any]]) -> int:
 
 
 def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tree]:
-    """Rebuild the trees as they stand after the given events.
+    """Rebuild the trees as they are after the given events.
 
     Cut the log with `Events.until` for an earlier instant. Where a node was rewired, the costs of
     its descendants follow; a log does not state those.
 
     Args:
         events: From the first event on.
-        distance: The robot's metric, on rows of configurations (`Point().distance`), to compute
-            the lengths of the edges of trees that rewire. By default they are what the log states
-            less the parent's cost then, so costs are right to about depth roundings. Trees that
-            only grow keep the costs that the log states.
+        distance: The robot's metric, on rows of configurations (`Point().distance`), to measure
+            the edges of trees that rewire. By default their lengths are what the log states less
+            the parent's cost then: costs are right to about depth roundings, and it takes longer.
+            Trees that only grow keep the costs that the log states.
 
     Raises:
         LogError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire names
-            a node that is not there, or closes a circle.
+            a node that does not exist, or closes a cycle.
     """
-    edges, rewired = events[Kind.EDGE], set(np.unique(events[Kind.REWIRE]["tree"]).tolist())
+    edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
     trees = {}
-    for number in sorted(set(np.unique(edges["tree"]).tolist()) | rewired):
-        rows = edges[edges["tree"] == number]
+    for number in trees_in(edges, rewires):
+        rows, rewired = of_tree(edges, number), of_tree(rewires, number)
         check_numbers(rows, number, 0)
-        tree = Tree(rows["q"], rows["parent"], rows["cost"], rows["seq"])
-        trees[number] = (
-            _rewired(tree, changes(events, number), distance) if (number in rewired) else tree
-        )
+        parent, cost = rows["parent"], rows["cost"]
+        if len(rewired):
+            changes = TreeChanges.of(rows, rewired)
+            parent, cost = _after(changes, rows["q"], distance)
+        trees[number] = Tree(rows["q"], parent, cost, rows["seq"])
     return trees
 
 
-def _rewired(tree: Tree, made: Changes, distance: Distance | None) -> Tree:
-    """Make the changes to a tree that so far has the parents that its nodes were born with."""
-    length = None
+def _after(
+    changes: TreeChanges, q: NDArray[np.float64], distance: Distance | None
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Return the parents and costs after all changes, shape (n,) each."""
     if distance is not None:
-        length = edge_lengths(tree.q, made, distance)
-    ledger = fold(made, length)
-    check_made(made, ledger.verdict)
-    return Tree(tree.q, ledger.parent.astype(np.int32), ledger.cost, tree.born)
+        check_verdicts(changes, changes.existence())
+        parent = np.full(len(q), -1, np.int32)
+        parent[changes.node] = changes.parent  # of several changes of a node the last one counts
+        try:
+            return parent, final_costs(parent, changes.stated[changes.joins], q, distance)
+        except LogError:  # the fold names the event
+            pass
+    found = fold_costs(changes)
+    check_verdicts(changes, found.verdict)
+    return found.parent, found.cost
+
+
+def final_costs(
+    parent: NDArray[np.int32],
+    stated: NDArray[np.float64],
+    q: NDArray[np.float64],
+    distance: Distance,
+) -> NDArray[np.float64]:
+    """Measure the costs-to-come of a tree's nodes, shape (n,).
+
+    Args:
+        parent: Parents, below 0 for a root, shape (n,).
+        stated: Costs, which count for roots, shape (n,).
+        q: Configurations, shape (n, dof).
+        distance: The robot's metric.
+
+    Raises:
+        LogError: A node is its own ancestor.
+    """
+    order = np.argsort(depths(parent), kind="stable")
+    length = np.zeros(len(parent))
+    below = np.flatnonzero(parent >= 0)
+    length[below] = distance(q[parent[below]], q[below])
+    return sum_lengths(parent, length, stated, order)
 
 
 def check_numbers(rows: Table, tree: int, first: int) -> None:
-    """See that the edges of a tree number its nodes on from `first`.
+    """Check that the edges of a tree number its nodes on from `first`.
 
     Raises:
         LogError: They do not.
@@ -199,19 +241,23 @@ def check_numbers(rows: Table, tree: int, first: int) -> None:
         )
 
 
-def check_made(made: Changes, verdict: NDArray[np.uint8]) -> None:
-    """See that all changes of a tree could be made.
+def check_verdicts(changes: TreeChanges, verdict: NDArray[np.uint8]) -> None:
+    """Check that all changes of a tree can be made.
 
     Raises:
-        LogError: One could not.
+        LogError: One cannot; the message names the first.
     """
-    wrong = np.flatnonzero(verdict != SOUND)
+    wrong = np.flatnonzero(verdict != VALID)
     if len(wrong):
         i = int(wrong[0])
-        node, parent = int(made.node[i]), int(made.parent[i])
-        why = {
-            NO_PARENT: f"node {node} gets parent {parent}, which is not there",
-            NO_NODE: f"node {node} is rewired before it is there",
-            CIRCLE: f"with parent {parent}, node {node} is its own ancestor",
-        }[int(verdict[i])]
-        raise LogError(f"event {made.seq[i]}: {why}")
+        why = reason(int(changes.node[i]), int(changes.parent[i]), int(verdict[i]))
+        raise LogError(f"event {changes.seq[i]}: {why}")
+
+
+def reason(node: int, parent: int, verdict: int) -> str:
+    """Return why a change cannot be made, in words."""
+    return {
+        NO_PARENT: f"node {node} gets parent {parent}, which does not exist",
+        NO_NODE: f"node {node} is rewired before it exists",
+        CYCLE: f"with parent {parent}, node {node} is its own ancestor",
+    }[verdict]

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Source, Stage, Table
+from brrt.replay.cost_history import CostHistory
 from brrt.replay.forest import Tree, forest
-from brrt.replay.ledger import Changes, Questions, changes, edge_lengths, fold
 from brrt.replay.transcript import choice_name
+from brrt.replay.tree_fold import TreeChanges
 from brrt.robots import Robot
 from brrt.verification.collision.motions import Obstacles, first_hits
 from brrt.worlds.world import World
@@ -247,24 +248,24 @@ class NodeTrace:
 
     def _cost_changes(self, events: Events, tree: Tree, robot: Robot) -> list[CostChange]:
         """Return the node's own rewires, and those of ancestors that changed its cost."""
-        rewires = events[Kind.REWIRE]
+        edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
         if not len(rewires):
             return []
-        made = changes(events, self._tree)
-        born = events[Kind.EDGE]["seq"][self._node]
-        later = rewires[rewires["seq"] > born]
-        seq = np.concatenate([[born], later["seq"]])
-        asked = Questions(seq, np.full(len(seq), self._node))
-        ledger = fold(made, edge_lengths(tree.q, made, robot.distance), asked)
-        costs = ledger.answers
-        concerned = np.flatnonzero((np.diff(costs) != 0) | (later["node"] == self._node))
-        some = later[concerned]
-        old = _parents_before(made)[np.searchsorted(made.seq, some["seq"])].tolist()
-        both = zip(costs[concerned].tolist(), costs[concerned + 1].tolist(), strict=True)
-        return [
-            CostChange(When.of(row), int(row["node"]), parent, int(row["parent"]), before, after)
-            for row, parent, (before, after) in zip(some, old, both, strict=True)
-        ]
+        changes = TreeChanges.of(edges, rewires)
+        length = changes.lengths(tree.q, robot.distance)
+        history = CostHistory(changes, length, np.ones(len(length), np.bool_))
+        found, node = [], np.array([self._node])
+        cost, until = history.at(edges["seq"][node], node)
+        while until[0] < len(length):
+            i, before = int(until[0]), float(cost[0])
+            cost, until = history.at(changes.seq[i : i + 1], node)
+            row = rewires[np.searchsorted(rewires["seq"], changes.seq[i])]
+            old = int(changes.parent[history.latest(row["node"][None], np.array([i]))[0]])
+            if cost[0] != before or row["node"] == self._node:
+                parents = old, int(row["parent"])
+                both = before, float(cost[0])
+                found.append(CostChange(When.of(row), int(row["node"]), *parents, *both))
+        return found
 
     def _waypoints(self, q: Floats) -> dict[str, int]:
         found = {}
@@ -293,16 +294,6 @@ class NodeTrace:
             )
             for i, row in enumerate(rows)
         ]
-
-
-def _parents_before(made: Changes) -> NDArray[np.int64]:
-    """Return the parent that each change replaces, -1 if the node joins, shape (m,)."""
-    order = np.argsort(made.node, kind="stable")
-    node, parent = made.node[order], made.parent[order]
-    before = np.full(len(order), -1, np.int64)
-    again = np.flatnonzero(node[1:] == node[:-1]) + 1
-    before[order[again]] = parent[again - 1]
-    return before
 
 
 def tree_name(tree: int) -> str:

@@ -52,7 +52,8 @@ class Snapshot:
             Events(batch.dof, {kind: batch[kind] for kind in (Kind.EDGE, Kind.REWIRE)})
             for batch in self._batches()
         ]
-        return forest(Events.concat(self.recording.manifest.dof, edges))
+        run = self.recording
+        return forest(Events.concat(run.manifest.dof, edges), run.robot().distance)
 
     @cached_property
     def metrics(self) -> Metrics:

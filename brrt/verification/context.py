@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
-from brrt.replay.ledger import (
-    NONE,
-    Changes,
-    Ledger,
-    Questions,
-    edge_lengths,
-    fold,
-    joined,
-    merged,
-    sum_up,
+from brrt.replay.cost_history import CostHistory
+from brrt.replay.tree_fold import (
+    VALID,
+    CostFold,
+    Distance,
+    TreeChanges,
+    fold_costs,
+    of_tree,
+    trees_in,
 )
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contracts_of
@@ -31,6 +30,7 @@ from brrt.verification.timeline import Scripts
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 CLOSE = 1e-9
 """Part of a length by which figures may differ from it; rounding stays far below."""
@@ -49,49 +49,59 @@ def waypoints(event: Any, dof: int) -> Floats:
     return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
 
 
-def _of_tree(table: Table, tree: int) -> Table:
-    """Return the rows of one tree; where they are all, the table itself and no copy."""
-    mine = table["tree"] == tree
-    return table if mine.all() else table[mine]
-
-
-def folded(made: Changes, length: Floats, asked: Questions = NONE) -> Ledger:
-    """Fold a tree, as `fold` does, with less to keep where nothing is rewired."""
-    return sum_up(made, length, asked) if made.joins.all() else fold(made, length, asked)
-
-
 @dataclass(frozen=True, eq=False)
-class Grown:
-    """All that happened to one tree.
+class TreeHistory:
+    """All that happens to one tree.
 
     Attributes:
         number: The tree's.
         edges: Its edges; node n is the n-th.
         rewires: Its rewires.
-        made: Both, in order.
+        changes: Both, in order.
         length: Length of the edge that each change makes, nan for roots, shape (m,).
-        ledger: The costs as they stood.
+        fold: What a fold finds of each change.
     """
 
     number: int
     edges: Table
     rewires: Table
-    made: Changes
+    changes: TreeChanges
     length: Floats
-    ledger: Ledger
+    fold: CostFold
+
+    @classmethod
+    def of(cls, number: int, events: Events, distance: Distance) -> Self:
+        """Fold the tree of a number."""
+        edges, rewires = (of_tree(events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
+        changes = TreeChanges.of(edges, rewires)
+        length = changes.lengths(np.asarray(edges["q"]), distance)
+        return cls(number, edges, rewires, changes, length, fold_costs(changes, length))
 
     def of_edges(self, column: NDArray[Any]) -> NDArray[Any]:
         """The part of a column of changes that belongs to the edges."""
-        return column[self.made.joins] if len(self.rewires) else column
+        return column[self.changes.joins] if len(self.rewires) else column
 
     def of_rewires(self, column: NDArray[Any]) -> NDArray[Any]:
         """The part that belongs to the rewires."""
-        return column[~self.made.joins] if len(self.rewires) else column[:0]
+        return column[~self.changes.joins] if len(self.rewires) else column[:0]
 
     def spans(self) -> Iterator[slice]:
         """Yield the edges in parts: of millions not all can be looked at at once."""
         for first in range(0, len(self.edges), _AT_ONCE):
             yield slice(first, min(first + _AT_ONCE, len(self.edges)))
+
+    @cached_property
+    def _history(self) -> CostHistory:
+        return CostHistory(self.changes, self.length, self.fold.verdict == VALID)
+
+    def costs(self, seq: Ints, node: Ints) -> Floats:
+        """Return what nodes cost after events, nan where they do not exist yet, shape (k,)."""
+        if len(self.rewires):
+            return self._history.at(seq, node)[0]
+        exist = (node >= 0) & (node < np.searchsorted(self.edges["seq"], seq, side="right"))
+        cost = np.full(len(node), np.nan)
+        cost[exist] = self.fold.cost[node[exist]]
+        return cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,21 +267,10 @@ class Context:
         result.look(table, hit >= 0, say)
 
     @cached_property
-    def trees(self) -> list[Grown]:
+    def trees(self) -> list[TreeHistory]:
         """The trees, each with its costs at every moment."""
-        numbers = {
-            int(number)
-            for kind in (Kind.EDGE, Kind.REWIRE)
-            for number in np.unique(self.events[kind]["tree"])
-        }
-        return [self._grown(number) for number in sorted(numbers)]
-
-    def _grown(self, number: int) -> Grown:
-        edges, rewires = (_of_tree(self.events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
-        made = merged(edges, rewires, 0) if len(rewires) else joined(edges)
-        length = edge_lengths(np.asarray(edges["q"]), made, self.distance)
-        ledger = folded(made, length)
-        return Grown(number, edges, rewires, made, length, ledger)
+        tables = self.events[Kind.EDGE], self.events[Kind.REWIRE]
+        return [TreeHistory.of(number, self.events, self.distance) for number in trees_in(*tables)]
 
     @cached_property
     def paths(self) -> list[tuple[Any, Floats]]:

@@ -105,10 +105,10 @@ def test_descendants_follow() -> None:
     [
         ((1, 3), "event 4: with parent 3, node 1 is its own ancestor"),
         ((2, 2), "event 4: with parent 2, node 2 is its own ancestor"),
-        ((2, 9), "event 4: node 2 gets parent 9, which is not there"),
-        ((2, -1), "event 4: node 2 gets parent -1, which is not there"),
-        ((9, 0), "event 4: node 9 is rewired before it is there"),
-        ((-5, 0), "event 4: node -5 is rewired before it is there"),
+        ((2, 9), "event 4: node 2 gets parent 9, which does not exist"),
+        ((2, -1), "event 4: node 2 gets parent -1, which does not exist"),
+        ((9, 0), "event 4: node 9 is rewired before it exists"),
+        ((-5, 0), "event 4: node -5 is rewired before it exists"),
     ],
 )
 def test_impossible_rewires(rewire: tuple[int, int], message: str) -> None:

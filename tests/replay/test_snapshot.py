@@ -49,7 +49,7 @@ def test_a_snapshot_is_the_log_up_to_its_instant(data: st.DataObject) -> None:
         elif each == "metrics":
             assert found.metrics.as_dict() == metrics.as_dict()
         elif each == "forest":
-            expected = forest(part)
+            expected = forest(part, run.problem.robot.distance)
             assert found.forest.keys() == expected.keys()
             for number, tree in expected.items():
                 assert np.array_equal(found.forest[number].parent, tree.parent)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from brrt import Events, Kind, RecordingError, Scenario, forest
 from brrt.replay.forest import depth_of
 from brrt.replay.tree_stats import TreeFigures, TreeStats
+from brrt.robots import Point
 from tests.conftest import recorded
 from tests.support.logs import split
 
@@ -20,7 +21,7 @@ BOTH = replace(GROWS, planner="bi-rrt-star", iterations=300)
 
 def followed(batches: list[Events]) -> list[TreeFigures]:
     """Follow the trees."""
-    growth = TreeStats()
+    growth = TreeStats(Point().distance)
     for batch in batches:
         growth.write(batch)
     return growth.figures()
@@ -65,7 +66,7 @@ def test_wrong_trees_are_refused() -> None:
     _, log = recorded(GROWS)
     for name, value, words in (
         ("node", 9, "joins tree 0 as its node"),
-        ("parent", 10**6, "which is not there"),
+        ("parent", 10**6, "which does not exist"),
     ):
         edges = log[Kind.EDGE].copy()
         row = np.flatnonzero(edges["tree"] == 0)[5]
@@ -75,5 +76,5 @@ def test_wrong_trees_are_refused() -> None:
     _, log = recorded(REWIRES)
     rewires = log[Kind.REWIRE].copy()
     rewires["node"][0] = 10**6
-    with pytest.raises(RecordingError, match="rewired before it is there"):
+    with pytest.raises(RecordingError, match="rewired before it exists"):
         followed([Events(2, {**log.tables, Kind.REWIRE: rewires})])

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from brrt.events import Kind, Reason, Source, Table
 from brrt.scenario.contract import Contract, Growth
 from brrt.verification.collision.motions import towards
-from brrt.verification.context import CLOSE, Context, Grown, Windows
+from brrt.verification.context import CLOSE, Context, TreeHistory, Windows
 from brrt.verification.neighbours import Neighbours, nearest
 from brrt.verification.result import RuleResult
 from brrt.verification.retention import Thinned
@@ -98,7 +98,7 @@ def _aimed(contract: Contract, lines: Table) -> Ints:
 
 
 def _look_steered(
-    context: Context, result: RuleResult, contract: Contract, tree: Grown, pairs: Table
+    context: Context, result: RuleResult, contract: Contract, tree: TreeHistory, pairs: Table
 ) -> None:
     """Hold the extensions of a tree to what is due."""
     aim, done, step = pairs["aim"], pairs["done"], contract.step or np.inf

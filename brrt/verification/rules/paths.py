@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Phase, Stage, Status
-from brrt.replay.ledger import SOUND
+from brrt.replay.tree_fold import VALID
 from brrt.verification.context import Context
 from brrt.verification.result import RuleResult
 from brrt.verification.rules.log import text
@@ -105,8 +105,8 @@ class _Parents:
     def __init__(self, context: Context, number: int, wanted: set[Place]) -> None:
         tree = context.trees[number]
         self.q = np.asarray(tree.edges["q"])
-        self.made = tree.made
-        self.sound = (tree.ledger.verdict == SOUND) & (tree.made.parent >= 0)
+        self.made = tree.changes
+        self.sound = (tree.fold.verdict == VALID) & (tree.changes.parent >= 0)
         self.parent = np.full(len(tree.edges), -1, np.int64)
         self.done = 0
         self.nodes: dict[Place, list[int]] = {}

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Stage, Table
-from brrt.replay.ledger import SOUND, Questions
+from brrt.replay.tree_fold import VALID
 from brrt.scenario.contract import Near
-from brrt.verification.context import CLOSE, Context, Grown, folded
+from brrt.verification.context import CLOSE, Context, TreeHistory
 from brrt.verification.neighbours import Neighbours
 from brrt.verification.result import RuleResult
 from brrt.verification.timeline import numbered
@@ -37,7 +37,7 @@ class _Joined(NamedTuple):
         far: How far it was, shape (m,).
     """
 
-    tree: Grown
+    tree: TreeHistory
     rows: Ints
     radius: Floats
     at: Ints
@@ -46,8 +46,7 @@ class _Joined(NamedTuple):
 
     def costs(self, moments: Ints) -> Floats:
         """What those near cost, each after the event of its row in `moments`, shape (m,)."""
-        asked = Questions(moments[self.at], self.other)
-        return folded(self.tree.made, self.tree.length, asked).answers
+        return self.tree.costs(moments[self.at], self.other)
 
 
 def _joined(context: Context) -> Iterator[_Joined]:
@@ -58,14 +57,14 @@ def _joined(context: Context) -> Iterator[_Joined]:
     """
     for number, (_, contract) in enumerate(context.stretches):
         for tree in context.trees if contract.growth is not None else ():
-            sound = tree.of_edges((tree.ledger.verdict == SOUND) & (tree.made.parent >= 0))
+            sound = tree.of_edges((tree.fold.verdict == VALID) & (tree.changes.parent >= 0))
             rows = np.flatnonzero(sound & (context.stretch(tree.edges) == number))
             if contract.near is not None and len(rows):
                 some = np.linspace(0, len(rows) - 1, min(MOST, len(rows))).astype(np.int64)
                 yield _around(context, contract.near, tree, rows[some])
 
 
-def _around(context: Context, near: Near, tree: Grown, rows: Ints) -> _Joined:
+def _around(context: Context, near: Near, tree: TreeHistory, rows: Ints) -> _Joined:
     q = np.asarray(tree.edges["q"])
     radius = near.radius(rows + 1)
     # What is at the radius but for a rounding may be near or not.
@@ -114,7 +113,7 @@ def parents(context: Context, result: RuleResult) -> None:
         tree, at, other = joined.tree, joined.at, joined.other
         edges = tree.edges[joined.rows]
         length = tree.of_edges(tree.length)[joined.rows]
-        cost = tree.of_edges(tree.ledger.parent_cost)[joined.rows] + length
+        cost = tree.of_edges(tree.fold.parent_cost)[joined.rows] + length
         through = joined.costs(edges["seq"] - 1) + joined.far
         gain = cost[at] - through
         event = edges[at]
@@ -144,7 +143,7 @@ def rewirings(context: Context, result: RuleResult) -> None:
         # All that a node's joining leads to is told before the next one joins.
         ends = np.append(all_edges["seq"][1:] - 1, -1 if context.cut else 1 << 62)[joined.rows]
         length = tree.of_edges(tree.length)[joined.rows]
-        cost = tree.of_edges(tree.ledger.parent_cost)[joined.rows] + length
+        cost = tree.of_edges(tree.fold.parent_cost)[joined.rows] + length
         through, now = cost[at] + joined.far, joined.costs(np.maximum(ends, 0))
         event, far_end = edges[at], np.asarray(all_edges["q"][other])
         here = _keys(event["iteration"], event["tree"], other, np.asarray(event["q"]))
@@ -175,12 +174,11 @@ def paths_told(context: Context, result: RuleResult) -> None:
     moments = moments[::-1][::fewer][::-1]
     if not len(ways) or not len(moments):
         return
-    # All ways at each moment are asked for at once: a tree is gone through but once.
     cost = np.array([far for *_, far in ways]) + np.zeros((len(moments), len(ways)))
     for number, tree in enumerate(context.trees[: len(ways[0][1])]):
         nodes = np.array([pair[number] for _, pair, _ in ways])
-        asked = Questions(np.repeat(moments, len(ways)), np.tile(nodes, len(moments)))
-        cost += folded(tree.made, tree.length, asked).answers.reshape(cost.shape)
+        all_nodes = np.tile(nodes, len(moments))
+        cost += tree.costs(np.repeat(moments, len(ways)), all_nodes).reshape(cost.shape)
     known = moments[:, None] >= np.array([since for since, *_ in ways])
     least = np.fmin.reduce(np.where(known, cost, np.inf), axis=1)
     paths = context.events[Kind.PATH]

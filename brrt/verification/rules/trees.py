@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Table
-from brrt.replay.ledger import CIRCLE, NO_NODE, NO_PARENT, SOUND, Questions
-from brrt.verification.context import Context, Grown, folded
+from brrt.replay.forest import reason
+from brrt.replay.tree_fold import VALID
+from brrt.verification.context import Context, TreeHistory
 from brrt.verification.result import RuleResult
 from brrt.verification.rules.log import text
 
@@ -21,12 +22,12 @@ _EDGE = "the edge to node", "node"
 def nodes(context: Context, result: RuleResult) -> None:
     """Nodes join a tree as 0, 1, 2 ... below a node that is there."""
     for tree in context.trees:
-        verdict = tree.of_edges(tree.ledger.verdict)
+        verdict = tree.of_edges(tree.fold.verdict)
         for span in tree.spans():
             edges, first = tree.edges[span], span.start
             misnumbered = edges["node"] != np.arange(span.start, span.stop)
             result.look(
-                edges, misnumbered | (verdict[span] != SOUND),
+                edges, misnumbered | (verdict[span] != VALID),
                 lambda i, e=edges, m=misnumbered, n=first: (  # type: ignore[misc]
                     f"node {e['node'][i]} joins tree {e['tree'][i]} as its node {n + i}" if m[i]
                     else f"node {n + i} gets parent {e['parent'][i]}, which is not there"
@@ -61,12 +62,12 @@ def edge_lengths(context: Context, result: RuleResult) -> None:
     stepping = any(contract.step is not None for _, contract in context.stretches)
     sees = np.array([contract.line_of_sight for _, contract in context.stretches])
     for tree in context.trees if stepping else ():
-        lengths, verdict = tree.of_edges(tree.length), tree.of_edges(tree.ledger.verdict)
+        lengths, verdict = tree.of_edges(tree.length), tree.of_edges(tree.fold.verdict)
         for span in tree.spans():
             edges, length = tree.edges[span], lengths[span]
             step = context.limits(edges, lambda contract: contract.step)
             there = np.isfinite(length) | (edges["parent"] >= 0)
-            wrong = there & ~context.at_most(length, step) & (verdict[span] == SOUND)
+            wrong = there & ~context.at_most(length, step) & (verdict[span] == VALID)
             wrong &= ~sees[context.stretch(edges)] | (np.asarray(edges["q"]) != context.goal).any(
                 axis=1
             )
@@ -78,19 +79,19 @@ def edge_lengths(context: Context, result: RuleResult) -> None:
             )  # fmt: skip
 
 
-def _sound_edges(tree: Grown) -> Iterator[tuple[Table, NDArray[np.int64]]]:
+def _sound_edges(tree: TreeHistory) -> Iterator[tuple[Table, NDArray[np.int64]]]:
     """Yield edges that join a node to a parent that is there, and their numbers, part by part."""
-    verdict = tree.of_edges(tree.ledger.verdict)
+    verdict = tree.of_edges(tree.fold.verdict)
     for span in tree.spans():
         edges = tree.edges[span]
-        rows = np.flatnonzero((verdict[span] == SOUND) & (edges["parent"] >= 0))
+        rows = np.flatnonzero((verdict[span] == VALID) & (edges["parent"] >= 0))
         yield edges[rows], rows + span.start
 
 
 def edge_costs(context: Context, result: RuleResult) -> None:
     """A node's cost is its parent's at that moment and the distance between them."""
     for tree in context.trees:
-        above, length = tree.of_edges(tree.ledger.parent_cost), tree.of_edges(tree.length)
+        above, length = tree.of_edges(tree.fold.parent_cost), tree.of_edges(tree.length)
         for edges, rows in _sound_edges(tree):
             _look_cost(context, result, edges, above[rows] + length[rows])
 
@@ -113,25 +114,19 @@ def edges_free(context: Context, result: RuleResult) -> None:
 def rewires(context: Context, result: RuleResult) -> None:
     """A rewire gives a node that is there a parent that is there and not its descendant."""
     for tree in context.trees:
-        verdict = tree.of_rewires(tree.ledger.verdict)
-        table = tree.rewires
-        result.look(table, verdict != SOUND, lambda i, t=table, v=verdict: _why(t[i], int(v[i])))  # type: ignore[misc]
-
-
-def _why(rewire: np.void, verdict: int) -> str:
-    node, parent = int(rewire["node"]), int(rewire["parent"])
-    return {
-        NO_PARENT: f"node {node} gets parent {parent}, which is not there",
-        NO_NODE: f"node {node} is rewired before it is there",
-        CIRCLE: f"with parent {parent}, node {node} is its own ancestor",
-    }[verdict]
+        verdict = tree.of_rewires(tree.fold.verdict)
+        node, parent = tree.rewires["node"], tree.rewires["parent"]
+        result.look(
+            tree.rewires, verdict != VALID,
+            lambda i, n=node, p=parent, v=verdict: reason(int(n[i]), int(p[i]), int(v[i])),  # type: ignore[misc]
+        )  # fmt: skip
 
 
 def rewire_costs(context: Context, result: RuleResult) -> None:
     """A rewired node's cost is its new parent's at that moment and the distance between them."""
     for tree in context.trees:
-        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
-        cost = tree.of_rewires(tree.ledger.parent_cost + tree.length)[sound]
+        sound = tree.of_rewires(tree.fold.verdict == VALID)
+        cost = tree.of_rewires(tree.fold.parent_cost + tree.length)[sound]
         _look_cost(context, result, tree.rewires[sound], cost)
 
 
@@ -146,9 +141,9 @@ def _look_cost(context: Context, result: RuleResult, table: Table, cost: Floats)
 def rewires_gain(context: Context, result: RuleResult) -> None:
     """A rewire never makes a node dearer."""
     for tree in context.trees:
-        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
-        table, before = tree.rewires[sound], tree.of_rewires(tree.ledger.before)[sound]
-        after = tree.of_rewires(tree.ledger.parent_cost + tree.length)[sound]
+        sound = tree.of_rewires(tree.fold.verdict == VALID)
+        table, before = tree.rewires[sound], tree.of_rewires(tree.fold.before)[sound]
+        after = tree.of_rewires(tree.fold.parent_cost + tree.length)[sound]
         result.look(
             table, ~context.at_most(after, before),
             lambda i, t=table, b=before, a=after: (  # type: ignore[misc]
@@ -161,8 +156,8 @@ def rewires_near(context: Context, result: RuleResult) -> None:
     """A rewire's new parent is within the radius that the planner promises."""
     nears = [contract.near for _, contract in context.stretches]
     for tree in context.trees if any(nears) else ():
-        sound = tree.of_rewires(tree.ledger.verdict == SOUND)
-        nodes = tree.of_rewires(np.cumsum(tree.made.joins))[sound]
+        sound = tree.of_rewires(tree.fold.verdict == VALID)
+        nodes = tree.of_rewires(np.cumsum(tree.changes.joins))[sound]
         length, table = tree.of_rewires(tree.length)[sound], tree.rewires[sound]
         radius, stretch = np.full(len(nodes), np.inf), context.stretch(table)
         for number, near in enumerate(nears):
@@ -178,7 +173,7 @@ def rewires_near(context: Context, result: RuleResult) -> None:
 def rewires_free(context: Context, result: RuleResult) -> None:
     """The edge to a new parent is free of obstacles."""
     for tree in context.trees:
-        sound, q = tree.of_rewires(tree.ledger.verdict == SOUND), np.asarray(tree.edges["q"])
+        sound, q = tree.of_rewires(tree.fold.verdict == VALID), np.asarray(tree.edges["q"])
         # Where events are out of order, the verdicts are those of others.
         for name in ("parent", "node"):
             sound = sound & (tree.rewires[name] >= 0) & (tree.rewires[name] < len(q))
@@ -220,7 +215,7 @@ def _asked(context: Context, number: int, table: Table, name: str) -> tuple[Floa
     for tree in context.trees:
         if tree.number == number and len(table):
             node = table[name].astype(np.int64)
-            cost = folded(tree.made, tree.length, Questions(table["seq"], node)).answers
+            cost = tree.costs(table["seq"], node)
             there = np.isfinite(cost)
             q[there] = tree.edges["q"][node[there]]
     return q, cost

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrt.errors import LogError
 from brrt.events import Events, Kind, Stage, Table
 from brrt.replay.forest import forest
-from brrt.replay.ledger import changes
+from brrt.replay.tree_fold import TreeChanges
 from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import Colour
@@ -69,7 +69,7 @@ class Drawing:
     def __init__(self, manifest: Manifest, world: World, events: Events) -> None:
         self._manifest, self._world, self._events = manifest, world, events
         self._robot = manifest.make_robot()
-        self._trees = forest(events)
+        self._trees = forest(events, self._robot.resolved(world).distance)
 
     def streams(self) -> Iterator[Stream]:
         """Yield all streams."""
@@ -88,7 +88,7 @@ class Drawing:
     def _tree(self, number: int) -> Stream:
         """Tell which edges there are; a rewired node's old edge goes and its new one comes."""
         tables = [self._of_tree(kind, number) for kind in (Kind.EDGE, Kind.REWIRE)]
-        made, places = changes(self._events, number), self._places(self._trees[number].q)
+        made, places = TreeChanges.of(*tables), self._places(self._trees[number].q)
         t = np.concatenate([table["t"] for table in tables])
         seq = np.concatenate([table["seq"] for table in tables])
         t = t[np.argsort(seq, kind="stable")]

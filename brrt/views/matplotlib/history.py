@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from brrt.errors import LogError
 from brrt.events import Events, Instant, Kind, Phase, Stage, Status
 from brrt.replay.forest import forest
-from brrt.replay.ledger import Changes, changes
+from brrt.replay.tree_fold import TreeChanges, of_tree
 from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.worlds.world import World
@@ -78,9 +78,10 @@ class History:
         self.robot = record.manifest.make_robot().resolved(record.world)
         self.contract = contract_of(record.manifest, record.world)
         self._places: dict[int, Floats] = {}
-        self._changes: dict[int, Changes] = {}
-        for number, tree in forest(record.events).items():
-            made = changes(record.events, number)
+        self._changes: dict[int, TreeChanges] = {}
+        for number, tree in forest(record.events, self.robot.distance).items():
+            tables = (record.events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
+            made = TreeChanges.of(*(of_tree(table, number) for table in tables))
             _check_parents(made, len(tree))
             self._places[number] = self.robot.places(tree.q)
             self._changes[number] = made
@@ -213,7 +214,7 @@ class History:
         return first, values[np.argsort(values["seq"], kind="stable")]
 
 
-def _check_parents(made: Changes, nodes: int) -> None:
+def _check_parents(made: TreeChanges, nodes: int) -> None:
     wrong = np.flatnonzero((made.parent >= nodes) | (made.parent == made.node))
     if len(wrong):
         i = int(wrong[0])
