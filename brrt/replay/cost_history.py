@@ -1,5 +1,7 @@
 """Costs of nodes of a tree that rewires, each at a moment of its own, by the way up to the root."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,7 +9,7 @@ from brrt.errors import LogError
 from brrt.replay.tree_fold import TreeChanges
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Ints = NDArray[np.signedinteger[Any]]
 
 _CHUNK = 1 << 14
 """Nodes whose ancestors are looked up at once."""
@@ -73,7 +75,8 @@ class CostHistory:
     def _climb(self, change: Ints, count: Ints) -> tuple[Floats, Ints]:
         """Go up to the roots from the nodes as changes have left them, then add up the lengths."""
         cost, until = np.zeros(len(change)), np.full(len(change), len(self._next))
-        rows, way = np.arange(len(change)), []
+        rows: Ints = np.arange(len(change))
+        way: list[tuple[Ints, Ints]] = []
         while len(rows):
             if len(way) > len(self._rows):
                 raise LogError("a node is its own ancestor")

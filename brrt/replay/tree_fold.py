@@ -7,7 +7,7 @@ as stale, and computes a stale cost when it is needed next.
 import math
 from array import array
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from brrt.events import Table
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Ints = NDArray[np.signedinteger[Any]]
 Flags = NDArray[np.bool_]
-Parents = NDArray[np.int32]
 Verdicts = NDArray[np.uint8]
 
 Distance = Callable[[Floats, Floats], Floats]
@@ -56,7 +55,7 @@ class TreeChanges(NamedTuple):
 
     seq: Ints
     node: Ints
-    parent: Parents
+    parent: Ints
     stated: Floats
     joins: Flags
 
@@ -116,7 +115,7 @@ class CostFold(NamedTuple):
     parent_cost: Floats
     before: Floats
     verdict: Verdicts
-    parent: Parents
+    parent: Ints
     cost: Floats
 
 
@@ -139,16 +138,16 @@ def fold_costs(changes: TreeChanges, length: Floats | None = None) -> CostFold:
         return CostFold(np.where(parent >= 0, cost[parent], np.nan), nothing, verdict, parent, cost)
     parent_cost, before = nothing.copy(), nothing.copy()
     # Single numbers are written to views of memory twice as fast as to arrays.
-    tree = _fold(changes, length, *map(memoryview, (parent_cost, before, verdict)))
+    tree = _fold(changes, length, parent_cost.data, before.data, verdict.data)
     return CostFold(parent_cost, before, verdict, np.array(tree.parent), np.array(tree.costs()))
 
 
 def _fold(
     changes: TreeChanges,
     length: Floats,
-    parent_cost: "memoryview[float]",
-    before: "memoryview[float]",
-    verdict: "memoryview[int]",
+    parent_cost: "memoryview[Any]",
+    before: "memoryview[Any]",
+    verdict: "memoryview[Any]",
 ) -> "_Tree":
     """Fold the changes whose ends exist; write what is found into the columns, shape (m,)."""
     joined = changes.node[changes.joins]
@@ -183,17 +182,17 @@ def _rows(
         yield from zip(rows.tolist(), *(c[rows].tolist() for c in columns), strict=True)
 
 
-def sum_lengths(parent: Parents, length: Floats, cost: Floats, order: Ints | None = None) -> Floats:
+def sum_lengths(parent: Ints, length: Floats, cost: Floats, order: Ints | None = None) -> Floats:
     """Add up the lengths of the edges from the roots on, shape (n,).
 
     Args:
-        parent: Parents, -1 for a root, shape (n,).
+        parent: Ints, -1 for a root, shape (n,).
         length: Lengths of the edges to the parents, shape (n,).
         cost: Costs, which count for roots, shape (n,).
         order: The nodes, each after its parent; 0, 1, 2 ... by default.
     """
     total = np.array(cost, np.float64)
-    costs = memoryview(total)
+    costs = total.data
     for first in range(0, len(total), _CHUNK):
         nodes = np.arange(first, min(first + _CHUNK, len(total)))
         nodes = nodes if order is None else order[nodes]
@@ -211,7 +210,7 @@ class _Tree:
         cost: Costs of the nodes as long as they have no parent, shape (n,).
 
     Attributes:
-        parent: Parents, -1 where there is none yet.
+        parent: Ints, -1 where there is none yet.
     """
 
     def __init__(self, cost: Floats) -> None:

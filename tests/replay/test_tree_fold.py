@@ -72,14 +72,20 @@ def logs(draw: st.DrawFn) -> tuple[TreeChanges, Floats | None]:
     return changes, draw(st.sampled_from([None, length]))
 
 
+def rows(changes: TreeChanges, some: slice) -> TreeChanges:
+    """Some of the changes."""
+    seq, node, parent, stated, joins = changes
+    return TreeChanges(seq[some], node[some], parent[some], stated[some], joins[some])
+
+
 @given(logs())
 def test_fold_is_the_twin(log: tuple[TreeChanges, Floats | None]) -> None:
     """Bit for bit: costs at each change, verdicts, and the tree at the end."""
     changes, length = log
     found, twin = fold_costs(changes, length), Twin()
     measured = np.full(len(changes.seq), np.nan) if length is None else length
-    rows = zip(*(column.tolist() for column in (*changes[1:], measured)), strict=True)
-    steps = [twin.change(*row) for row in rows]
+    each = zip(*(column.tolist() for column in (*changes[1:], measured)), strict=True)
+    steps = [twin.change(*row) for row in each]
     for column, expected in zip(found[:3], zip(*steps, strict=True), strict=True):
         np.testing.assert_array_equal(column, expected)
     nodes = range(int(changes.joins.sum()))
@@ -102,7 +108,7 @@ def test_cost_history_is_the_fold_cut_short(
     node = rng.integers(-1, len(full.cost) + 2, 30)
     cost, until = history.at(seq, node)
     m = len(changes.seq)
-    ends = [fold_costs(TreeChanges(*(c[:i] for c in changes)), length[:i]) for i in range(m + 1)]
+    ends = [fold_costs(rows(changes, slice(i)), length[:i]) for i in range(m + 1)]
     for s, k, found, last in zip(seq, node.tolist(), cost, until.tolist(), strict=True):
         first = int(np.searchsorted(changes.seq, s, side="right"))
         costs = [end.cost[k] if 0 <= k < len(end.cost) else np.nan for end in ends]
@@ -115,10 +121,8 @@ def test_cost_history_is_the_fold_cut_short(
 @pytest.mark.parametrize("order", [[0, 2, 1, 3], [3, 2, 1, 0]])
 def test_nodes_that_join_out_of_order(order: list[int]) -> None:
     """The fold ends, and gives each change a verdict, even where a node has children too early."""
-    node, parent = np.array(order), np.array([1, 2, 3, 0], np.int32)
-    changes = TreeChanges(np.arange(4), node, parent, np.zeros(4), np.ones(4, np.bool_))
-    rewire = TreeChanges(np.array([9]), np.array([0]), np.array([3]), np.zeros(1), np.zeros(1, bool))
-    both = TreeChanges(*(np.concatenate(pair) for pair in zip(changes, rewire, strict=True)))
-    found = fold_costs(both, np.ones(5))
+    node, parent = np.array([*order, 0]), np.array([1, 2, 3, 0, 3])
+    changes = TreeChanges(np.arange(5), node, parent, np.zeros(5), np.arange(5) < 4)
+    found = fold_costs(changes, np.ones(5))
     assert len(found.verdict) == 5
     assert np.isfinite(found.cost).all()

@@ -87,10 +87,10 @@ class Drawing:
 
     def _tree(self, number: int) -> Stream:
         """Tell which edges there are; a rewired node's old edge goes and its new one comes."""
-        tables = [self._of_tree(kind, number) for kind in (Kind.EDGE, Kind.REWIRE)]
-        made, places = TreeChanges.of(*tables), self._places(self._trees[number].q)
-        t = np.concatenate([table["t"] for table in tables])
-        seq = np.concatenate([table["seq"] for table in tables])
+        joins, rewires = (self._of_tree(kind, number) for kind in (Kind.EDGE, Kind.REWIRE))
+        made, places = TreeChanges.of(joins, rewires), self._places(self._trees[number].q)
+        t = np.concatenate([joins["t"], rewires["t"]])
+        seq = np.concatenate([joins["seq"], rewires["seq"]])
         t = t[np.argsort(seq, kind="stable")]
         edges = made.parent >= 0
         node, parent = made.node[edges], made.parent[edges]

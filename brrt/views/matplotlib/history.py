@@ -80,8 +80,8 @@ class History:
         self._places: dict[int, Floats] = {}
         self._changes: dict[int, TreeChanges] = {}
         for number, tree in forest(record.events, self.robot.distance).items():
-            tables = (record.events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
-            made = TreeChanges.of(*(of_tree(table, number) for table in tables))
+            edges, rewires = (record.events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
+            made = TreeChanges.of(of_tree(edges, number), of_tree(rewires, number))
             _check_parents(made, len(tree))
             self._places[number] = self.robot.places(tree.q)
             self._changes[number] = made
