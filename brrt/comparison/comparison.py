@@ -6,7 +6,7 @@ from typing import Any
 
 from brrt.comparison.events import Deviation, first_difference
 from brrt.comparison.report import Comparison, Cut
-from brrt.comparison.settings import settings_of, versions_of
+from brrt.comparison.settings import metadata_of, settings_of
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.formats import read
@@ -63,8 +63,8 @@ def compare(
     right.finish()
     return Comparison(
         names=names or (called_one, called_other),
-        settings=tuple(settings_of(one.manifest, one.world, other.manifest, other.world)),
-        metadata=tuple(versions_of(one.manifest, other.manifest)),
+        settings=tuple(settings_of(one, other)),
+        metadata=tuple(metadata_of(one.manifest, other.manifest)),
         cuts=(left.cut(), right.cut()),
         metrics=(left.metrics(), right.metrics()),
         timed=all(run.manifest.scenario.clock == "real" for run, _ in pairs),

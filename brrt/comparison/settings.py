@@ -1,4 +1,4 @@
-"""What two runs were told: settings that differ, and versions that do."""
+"""The settings that differ between two runs, and other metadata that does."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brrt.errors import BrrtError
+from brrt.recording import Recording
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contract_of, origins_of, planner_settings
 from brrt.scenario.manifest import Manifest
@@ -15,16 +16,15 @@ from brrt.worlds.world import World
 
 _PLAIN = ("planner", "seed", "draws", "time", "smooth", "shortcuts", "execute", "max_move",
           "deadline")  # fmt: skip
-_SHAPES = ("lower", "upper", "balls", "boxes")
 
 
 class Row(NamedTuple):
-    """A thing that both runs have; None where one of them has it not.
+    """A named value that differs; None for a run that does not have it.
 
     Attributes:
-        name: What it is.
-        a: In the first run.
-        b: In the second.
+        name: Its name.
+        a: The value in the first run.
+        b: The value in the second.
     """
 
     name: str
@@ -32,61 +32,55 @@ class Row(NamedTuple):
     b: Any
 
 
-def settings_of(a: Manifest, a_world: World, b: Manifest, b_world: World) -> Iterator[Row]:
-    """Yield the settings that differ, those that decide what a run does.
+def settings_of(a: Recording, b: Recording) -> Iterator[Row]:
+    """Yield the settings that differ: everything that decides what a run does.
 
     Names of files and the clock are not among them.
-
-    Args:
-        a: Manifest of the first run.
-        a_world: Its world.
-        b: Manifest of the second run.
-        b_world: Its world.
     """
-    ours, theirs = a.scenario, b.scenario
+    both = a.manifest, b.manifest
+    ours, theirs = (manifest.scenario for manifest in both)
     for name in _PLAIN:
         yield from _row(name, getattr(ours, name), getattr(theirs, name))
-    contracts = _contract(a, a_world), _contract(b, b_world)
+    contracts = _contract(a), _contract(b)
     limits = (
-        each.iteration_limit(contract.planner.default_iterations)
-        for each, contract in zip((ours, theirs), contracts, strict=True)
+        manifest.scenario.iteration_limit(contract.planner.default_iterations)
+        for manifest, contract in zip(both, contracts, strict=True)
     )
     yield from _row("iterations", *("no limit" if n >= MOST else n for n in limits))
-    yield from _branches(a, b)
-    robots = list(rows_of("robot", _robot(a, a_world), _robot(b, b_world)))
-    worlds = list(_worlds(a_world, b_world))
-    settings = planner_settings(a)[-1], planner_settings(b)[-1]
+    yield from _branches(*both)
+    robots, worlds = list(differing("robot", _robot(a), _robot(b))), list(_worlds(a.world, b.world))
+    settings = planner_settings(both[0])[-1], planner_settings(both[1])[-1]
     if ours.planner != theirs.planner or settings[0] != settings[1] or robots or worlds:
         yield from _params(settings, (contracts[0].planner.chosen, contracts[1].planner.chosen))
     yield from robots
-    yield from _row("start", list(a.start), list(b.start))
-    yield from _row("goal", list(a.goal), list(b.goal))
+    for name in ("start", "goal"):
+        yield from _row(name, *(list(getattr(manifest, name)) for manifest in both))
     yield from worlds
 
 
-def _contract(manifest: Manifest, world: World) -> Contract:
-    try:
-        return contract_of(manifest, world)
-    except BrrtError:  # start or goal is not free in this world
-        return Contract()
-
-
-def versions_of(a: Manifest, b: Manifest) -> Iterator[Row]:
-    """Yield what differs and leaves the run the same: names, clock, versions and platform."""
+def metadata_of(a: Manifest, b: Manifest) -> Iterator[Row]:
+    """Yield what differs but does not decide what a run does: names, clock, versions, platform."""
     for name in ("world", "robot", "clock"):
         yield from _row(name, getattr(a.scenario, name), getattr(b.scenario, name))
-    yield from rows_of("", a.made_by, b.made_by)
+    yield from differing("", a.made_by, b.made_by)
+
+
+def differing(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield the entries that differ between two tables, with a prefix before each name."""
+    for name in dict.fromkeys([*a, *b]):
+        yield from _row(f"{prefix} {name}".strip(), a.get(name), b.get(name))
+
+
+def _contract(run: Recording) -> Contract:
+    try:
+        return contract_of(run.manifest, run.world)
+    except BrrtError:  # start or goal is not free in this world
+        return Contract()
 
 
 def _row(name: str, a: Any, b: Any) -> Iterator[Row]:
     if a != b:
         yield Row(name, a, b)
-
-
-def rows_of(prefix: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Row]:
-    """Yield what differs in two tables of named values, with a word ahead of each name."""
-    for name in dict.fromkeys([*a, *b]):
-        yield from _row(f"{prefix} {name}".strip(), a.get(name), b.get(name))
 
 
 def _params(
@@ -113,51 +107,45 @@ def _auto(value: Any, digits: int = 6) -> str:
 
 
 def _branches(a: Manifest, b: Manifest) -> Iterator[Row]:
-    """Say from what each run branched; also what changed there, where it was not the same."""
-    brief = [", ".join(turn.origin for turn in each.branches) or "none" for each in (a, b)]
+    """Yield from where each run branched; with the changes there if the places are equal."""
+    if _changes(a) == _changes(b):
+        return
+    brief = [", ".join(branch.origin for branch in each.branches) or "none" for each in (a, b)]
     full = ["; ".join(origins_of(each)) or "none" for each in (a, b)]
-    if _turns(a) != _turns(b):
-        yield Row("branched from", *(brief if brief[0] != brief[1] else full))
+    yield Row("branched from", *(brief if brief[0] != brief[1] else full))
 
 
-def _turns(manifest: Manifest) -> list[Any]:
-    """Return what decides a run whose settings changed on the way; names of files do not."""
+def _changes(manifest: Manifest) -> list[Any]:
+    """Return what a run's branches change, without names of files."""
     settings = planner_settings(manifest)[:-1] if manifest.branches else ()
     pairs = zip(manifest.branches, settings, strict=True)
     return [(branch.iteration, branch.seed, values) for branch, values in pairs]
 
 
-def _robot(manifest: Manifest, world: World) -> dict[str, Any]:
-    """Return the robot's definition, settled in its world."""
-    text = manifest.robot or manifest.make_robot().resolved(world).to_json()
+def _robot(run: Recording) -> dict[str, Any]:
+    """Return the robot's definition, resolved in its world."""
+    text = run.manifest.robot or run.robot().to_json()
     return {k: v for k, v in json.loads(text).items() if k not in ("schema", "version", "name")}
 
 
 def _worlds(a: World, b: World) -> Iterator[Row]:
-    """Say how the contents of two worlds differ."""
-    for name in _SHAPES:
-        yield from _arrays(name, getattr(a, name), getattr(b, name))
-    if len(a.polygons) != len(b.polygons):
-        yield Row("world polygons", len(a.polygons), len(b.polygons))
-    else:
-        pairs = zip(a.polygons, b.polygons, strict=True)
-        other = sum(not np.array_equal(p, q) for p, q in pairs)
-        if other:
-            yield Row("world polygons", len(a.polygons), f"{other} of them other ones")
+    """Yield how the contents of two worlds differ."""
+    for name in ("lower", "upper"):
+        yield from _row(f"world {name}", getattr(a, name).tolist(), getattr(b, name).tolist())
+    for name in ("balls", "boxes", "polygons"):
+        ours, theirs = getattr(a, name), getattr(b, name)
+        if len(ours) != len(theirs):
+            yield Row(f"world {name}", len(ours), len(theirs))
+            continue
+        if isinstance(ours, np.ndarray) and ours.shape == theirs.shape:  # there may be millions
+            unlike = int((ours != theirs).any(axis=1).sum())
+        else:
+            unlike = sum(not np.array_equal(p, q) for p, q in zip(ours, theirs, strict=True))
+        if unlike:
+            yield Row(f"world {name}", len(ours), f"{unlike} of them differ")
     grids = [None if world.grid is None else world.grid.as_json() for world in (a, b)]
     if grids[0] != grids[1]:
         yield Row("world grid", *(_grid(world) for world in (a, b)))
-
-
-def _arrays(name: str, a: Any, b: Any) -> Iterator[Row]:
-    if name in ("lower", "upper"):
-        yield from _row(f"world {name}", a.tolist(), b.tolist())
-    elif len(a) != len(b):
-        yield Row(f"world {name}", len(a), len(b))
-    elif len(a) and not np.array_equal(a, b):
-        same = a.shape == b.shape
-        other = int((a != b).any(axis=1).sum()) if same else len(a)
-        yield Row(f"world {name}", len(a), f"{other} of them other ones")
 
 
 def _grid(world: World) -> str | None:

@@ -6,7 +6,7 @@ from typing import Any, Self, TypeGuard
 
 from brrt.comparison.difference import Difference, Event
 from brrt.comparison.events import Deviation, first_difference
-from brrt.comparison.settings import Row, rows_of
+from brrt.comparison.settings import Row, differing
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
 from brrt.planners import PLANNERS, make_planner, make_stop
@@ -150,7 +150,7 @@ def reproduce(
     if first is not None and first.left is None and _begins_phase(first.right):
         # An interruption between two phases leaves no event: the next phase is missing.
         ended, first = f"the run was interrupted before the phase {first.right['name']}", None
-    versions = tuple(rows_of("", manifest.made_by, made_by()))
+    versions = tuple(differing("", manifest.made_by, made_by()))
     return Reproduction(end.compared, first, deviation, versions, ended)
 
 

@@ -196,7 +196,7 @@ def test_a_world_of_the_same_name_with_other_content() -> None:
     assert not found.equal
     assert found.first is None
     (row,) = found.settings
-    assert (row.name, row.b) == ("world balls", "1 of them other ones")
+    assert (row.name, row.b) == ("world balls", "1 of them differ")
 
 
 def test_automatic_settings_are_resolved() -> None:

@@ -200,11 +200,12 @@ def test_golden_recordings_state_none() -> None:
 def test_settings_of_a_recording_without_a_contract() -> None:
     """They compare as those of one that has it."""
     run, _ = made("rrt-star")
-    with_, without = run.manifest, replace(run.manifest, contract=None)
-    world = run.problem.world
-    assert list(settings_of(with_, world, without, world)) == []
+    with_ = Recording(run.manifest, run.problem.world, list)
+    without = replace(run.manifest, contract=None)
+    assert list(settings_of(with_, replace(with_, manifest=without))) == []
     other = replace(without, scenario=replace(without.scenario, params={"step": 3.0}))
-    assert [row.name for row in settings_of(with_, world, other, world)] == ["param step"]
+    rows = settings_of(with_, replace(with_, manifest=other))
+    assert [row.name for row in rows] == ["param step"]
 
 
 BLOCKED = """
