@@ -1,7 +1,7 @@
-"""The vocabulary: what a planner can say, and how a log of it is held.
+"""The events of a run: their kinds and fields, and how a log of them is kept in memory.
 
-A new kind of event is added here alone: give it a number in `Kind` and its fields in `FIELDS`.
-Writers, readers, views and comparisons derive their layouts from that declaration.
+To add a kind of event, give it a number in `Kind`, its fields in `FIELDS` and, if runs report how
+many there are, a row in `COUNTS`. The layouts of kernels, files and comparisons follow from these.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -14,14 +14,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 LATEST_NS = (1 << 62) - 1
-"""When a run may begin at the latest, in ns since 1970: in the year 2116."""
+"""Latest time at which a run may begin, in ns since 1970: in the year 2116."""
 
 Table = NDArray[np.void]
 """Events of one kind: a structured array with `seq`, `t`, `iteration` and the kind's fields."""
 
 
+class Named(IntEnum):
+    """An enumeration whose members have names for texts and for files."""
+
+    @property
+    def label(self) -> str:
+        """The name in texts, such as "no path"."""
+        return self.key.replace("_", " ")
+
+    @property
+    def key(self) -> str:
+        """The name in files, paths and JSON, such as "no_path"."""
+        return self.name.lower()
+
+    @classmethod
+    def label_of(cls, value: int) -> str:
+        """Return the label of a number from a log, or the number if it is not a member."""
+        return cls(value).label if value in set(cls) else str(value)
+
+
 @unique
-class Kind(IntEnum):
+class Kind(Named):
     """What happened."""
 
     PHASE = 0
@@ -36,14 +55,9 @@ class Kind(IntEnum):
     HEURISTIC = 9
     MOVE = 10
 
-    @property
-    def label(self) -> str:
-        """The name in files and in JSON."""
-        return self.name.lower()
-
 
 @unique
-class Phase(IntEnum):
+class Phase(Named):
     """A part of a run."""
 
     PLAN = 0
@@ -52,8 +66,8 @@ class Phase(IntEnum):
 
 
 @unique
-class Status(IntEnum):
-    """How a phase stands: it begins, or how it ended."""
+class Status(Named):
+    """The state of a phase: it begins, or how it ended."""
 
     BEGIN = 0
     SOLVED = 1
@@ -62,12 +76,12 @@ class Status(IntEnum):
     INTERRUPTED = 4
     DONE = 5
     NO_PATH = 6
-    """Proved that there is none."""
+    """The planner proved that there is no path."""
 
 
 @unique
-class Source(IntEnum):
-    """Where a sample came from."""
+class Source(Named):
+    """Origin of a sample."""
 
     UNIFORM = 0
     GOAL = 1
@@ -76,7 +90,7 @@ class Source(IntEnum):
 
 
 @unique
-class Reason(IntEnum):
+class Reason(Named):
     """Why an extension failed."""
 
     COLLISION = 0
@@ -89,7 +103,7 @@ class Reason(IntEnum):
 
 
 @unique
-class Stage(IntEnum):
+class Stage(Named):
     """Which path of the run this is."""
 
     RAW = 0
@@ -97,21 +111,25 @@ class Stage(IntEnum):
     IMPROVED = 2
 
 
-EnumClass = type[IntEnum]
+Choices = type[Named]
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
     """One field of a kind of event.
 
-    `type` is a ROS 2 primitive, `q` (one configuration, float64[dof]) or `q[]` (configurations
-    in a row, of any number). `choices` gives an integer field its names.
+    Attributes:
+        name: Name of the column.
+        type: A ROS 2 primitive, `q` (one configuration, float64[dof]) or `q[]` (any number of
+            configurations).
+        doc: Meaning, for the documentation.
+        choices: Names of the values of an integer field.
     """
 
     name: str
     type: str
     doc: str
-    choices: "EnumClass | None" = None
+    choices: Choices | None = None
 
 
 _TREE = Field("tree", "uint8", "0 grows from the start, 1 from the goal")
@@ -122,12 +140,12 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
         Field("name", "uint8", "part of the run", Phase),
         Field("status", "uint8", "begins, or how it ended", Status),
     ),
-    Kind.SAMPLE: (_TREE, Field("source", "uint8", "where the sample came from", Source), _Q),
+    Kind.SAMPLE: (_TREE, Field("source", "uint8", "origin of the sample", Source), _Q),
     Kind.REJECT: (
         _TREE,
-        Field("node", "int32", "node that the extension left from"),
+        Field("node", "int32", "node that the extension started from"),
         Field("reason", "uint8", "why it failed", Reason),
-        Field("q", "q", "configuration that the extension wanted to reach"),
+        Field("q", "q", "configuration that the extension headed for"),
     ),
     Kind.EDGE: (
         _TREE,
@@ -142,7 +160,7 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
         Field("waypoints", "q[]", "configurations from start to goal"),
     ),
     Kind.SHORTCUT: (
-        Field("i", "int32", "first waypoint of the pair, numbered on the path as it stood"),
+        Field("i", "int32", "first waypoint of the pair, numbered on the path before the attempt"),
         Field("j", "int32", "second waypoint"),
         Field("accepted", "bool", "whether the direct motion was free and replaced the detour"),
         Field("cost", "float64", "cost of the path after the attempt"),
@@ -159,7 +177,7 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
         Field("cost", "float64", "cost of the path from start to goal over this link"),
     ),
     Kind.EXPAND: (
-        Field("cell", "int32", "cell of the lattice, numbered from 0, the start's, as first seen"),
+        Field("cell", "int32", "cell of the lattice, numbered from 0 (the start) as first seen"),
         Field("parent", "int32", "cell that it was reached from in this search; -1 for its first"),
         Field("cost", "float64", "cost from this search's first cell"),
         _Q,
@@ -172,16 +190,50 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
     Kind.MOVE: (
         Field("trial", "int32", "0, 1 ...: each trial begins at the start"),
         Field("step", "int32", "moves of this trial so far, this one included"),
-        Field("cell", "int32", "cell of the lattice that it ends in; -1 where there is none"),
+        Field("cell", "int32", "cell of the lattice that it ends in; -1 if there is none"),
         Field("cost", "float64", "length of this trial's moves so far, this one included"),
-        Field("q", "q", "where the robot moves to, straight"),
+        Field("q", "q", "configuration that the robot moves to, in a straight line"),
     ),
 }
 
 
+class Count(NamedTuple):
+    """How the events of a kind are counted.
+
+    Attributes:
+        key: Name of the count in a run's metrics; None if they do not report it.
+        one: Label of a single event, after its number.
+        many: Label of several events, after their number.
+        by: Field whose values a transcript counts separately.
+    """
+
+    key: str | None
+    one: str
+    many: str
+    by: str | None = None
+
+    def text(self, number: int) -> str:
+        """Write a number of events: "1 node", "1,200 nodes"."""
+        return f"{number:,} {self.one if number == 1 else self.many}"
+
+
+COUNTS: Mapping[Kind, Count] = {
+    Kind.SAMPLE: Count("samples", "sample", "samples", "source"),
+    Kind.EDGE: Count("edges", "node", "nodes", "tree"),
+    Kind.REJECT: Count("rejects", "rejected", "rejected", "reason"),
+    Kind.REWIRE: Count("rewires", "rewired", "rewired"),
+    Kind.CONNECT: Count("links", "link", "links"),
+    Kind.EXPAND: Count("expanded", "cell expanded", "cells expanded"),
+    Kind.HEURISTIC: Count("learned", "estimate raised", "estimates raised"),
+    Kind.SHORTCUT: Count("shortcuts", "shortcut", "shortcuts", "accepted"),
+    Kind.MOVE: Count(None, "move", "moves"),
+}
+"""The kinds that are counted, in the order of reports."""
+
+
 @cache
 def table_dtype(kind: Kind, dof: int) -> np.dtype[np.void]:
-    """Layout of a table: the three columns that every event has, then the kind's own."""
+    """Layout of a table: the three columns that every event has, then the kind's fields."""
     columns: list[tuple[Any, ...]] = [("seq", "<i8"), ("t", "<i8"), ("iteration", "<i8")]
     for field in FIELDS[kind]:
         if field.type == "q":
@@ -194,19 +246,19 @@ def table_dtype(kind: Kind, dof: int) -> np.dtype[np.void]:
 
 
 class Instant(NamedTuple):
-    """When an event happened: `t` in ns, and the planner's count."""
+    """The time of an event: `t` in ns, and the planner's iteration."""
 
     t: int
     iteration: int
 
 
 class LazyTables(Mapping[Kind, Table]):
-    """Tables that are built when someone asks for them, as a rule on the thread that writes them.
+    """Tables that are built on first access, usually on the thread that writes them.
 
     Args:
-        counts: Events of each kind that occurs.
-        last: When the last of them happened.
-        build: Makes the table of a kind.
+        counts: Number of events of each kind that occurs.
+        last: Time of the last event.
+        build: Builds the table of a kind.
     """
 
     def __init__(
@@ -232,11 +284,11 @@ class LazyTables(Mapping[Kind, Table]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Events:
-    """A batch of events, in one table a kind; a whole log is only a longer batch.
+    """A batch of events in one table per kind; a whole log is one long batch.
 
     Attributes:
         dof: Numbers in a configuration.
-        tables: For each kind that occurs, its events in the order of `seq`.
+        tables: The events of each kind that occurs, ordered by `seq`.
     """
 
     dof: int
@@ -247,14 +299,14 @@ class Events:
 
     @property
     def counts(self) -> Mapping[Kind, int]:
-        """Events of each kind that occurs."""
+        """Number of events of each kind that occurs."""
         if isinstance(self.tables, LazyTables):
             return self.tables.counts
         return {kind: len(table) for kind, table in self.tables.items()}
 
     @property
     def last(self) -> Instant:
-        """When the last event happened; zero where there is none."""
+        """Time of the last event; zero if there is none."""
         if isinstance(self.tables, LazyTables):
             return self.tables.last
         tables = [table for table in self.tables.values() if len(table)]
@@ -269,7 +321,7 @@ class Events:
 
     @classmethod
     def concat(cls, dof: int, batches: Iterable["Events"]) -> Self:
-        """Join batches, given in order, into one log."""
+        """Join consecutive batches into one log."""
         parts: dict[Kind, list[Table]] = {}
         for batch in batches:
             for kind, table in batch.tables.items():
@@ -279,9 +331,9 @@ class Events:
     def until(
         self, *, seq: int | None = None, t: int | None = None, iteration: int | None = None
     ) -> "Events":
-        """Return the events up to and including a number, a time (ns) or an iteration.
+        """Return the events up to and including a `seq`, a time (ns) or an iteration.
 
-        All three columns never fall along a log, so each table is cut by bisection.
+        None of the three columns decreases along a log, so each table is cut by bisection.
         """
         tables = self.tables
         for column, last in (("seq", seq), ("t", t), ("iteration", iteration)):
@@ -293,7 +345,7 @@ class Events:
         return Events(self.dof, {kind: table for kind, table in tables.items() if len(table)})
 
     def kinds_in_order(self) -> tuple[int, NDArray[np.uint8]]:
-        """Return the first `seq` and the kind of each event from there on, shape (n,)."""
+        """Return the first `seq` and the kinds of the events in the order of `seq`, shape (n,)."""
         first = min((int(table["seq"][0]) for table in self.tables.values()), default=0)
         order = np.empty(len(self), np.uint8)
         for kind, table in self.tables.items():
@@ -302,7 +354,7 @@ class Events:
 
 
 def _joined(tables: list[Table]) -> Table:
-    """Concatenate tables of one kind; as plain bytes, since field by field takes five times."""
+    """Concatenate tables of one kind; as plain bytes, which is five times as fast as by fields."""
     dtype = tables[0].dtype
     if dtype.hasobject or any(table.dtype != dtype for table in tables):
         return np.concatenate(tables)

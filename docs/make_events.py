@@ -29,8 +29,7 @@ def page() -> str:
             choices = (
                 ""
                 if field.choices is None
-                else ": "
-                + ", ".join(f"{c.value} {c.name.lower().replace('_', ' ')}" for c in field.choices)
+                else ": " + ", ".join(f"{c.value} {c.label}" for c in field.choices)
             )
             parts.append(f"| {field.name} | {field.type} | {field.doc}{choices} |")
     return "\n".join(parts) + "\n"

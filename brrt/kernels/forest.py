@@ -1,35 +1,33 @@
-"""The trees that planners grow: nodes with parents, costs-to-come and nearest neighbours."""
+"""Trees of planners: nodes with parents, costs-to-come and nearest neighbours."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind
-from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
+from brrt.kernels.arrays import enlarged
+from brrt.kernels.emit import Buffer, emit_edge, emit_path, point_room, room, take_points
 from brrt.kernels.jit import inline_helper
-from brrt.kernels.kdtree import KdTree, grown_kdtree, has_room, insert, rooted_kdtree
+from brrt.kernels.kdtree import KdTree, enlarged_kdtree, has_room, insert, rooted_kdtree
 from brrt.kernels.space import distance
 
 Floats = NDArray[np.float64]
 
-_EDGE, _PATH = int(Kind.EDGE), int(Kind.PATH)
-
 RESERVED_NODES = 1 << 22
-"""Room that is asked for at once. Memory is taken only as it fills, so asking costs nothing, and a
-tree that never has to grow never stands in memory twice."""
+"""Nodes to allocate at once. The system provides memory only as it is written, so this costs
+nothing, and a tree that is never enlarged never needs its memory twice."""
 
 
-class Forest(NamedTuple):
-    """Trees that share their arrays; tree r begins with node r, its root.
+class ForestArrays(NamedTuple):
+    """Trees that share their arrays; node r is the root of tree r.
 
     Attributes:
         q: Configuration of each node, shape (capacity, dof).
         parent: Parent of each node, -1 for a root, shape (capacity,).
         cost: Cost-to-come of each node, shape (capacity,).
         number: Number of each node within its own tree, shape (capacity,).
-        neighbours: Nearest neighbours, tree by tree.
-        nodes: Nodes in all, then in each tree, shape (1 + trees,).
+        neighbours: A k-d tree for each tree.
+        nodes: Number of nodes in all, then in each tree, shape (1 + trees,).
     """
 
     q: Floats
@@ -40,11 +38,11 @@ class Forest(NamedTuple):
     nodes: NDArray[np.int64]
 
 
-def rooted_forest(roots: Floats, capacity: int) -> Forest:
+def rooted_forest(roots: Floats, capacity: int) -> ForestArrays:
     """Make a tree for each root, shape (trees, dof), with room for `capacity` nodes in all."""
     trees, dof = roots.shape
     capacity = max(min(capacity, RESERVED_NODES), trees)
-    forest = Forest(
+    forest = ForestArrays(
         q=np.empty((capacity, dof)),
         parent=np.empty(capacity, np.int32),
         cost=np.empty(capacity),
@@ -57,37 +55,36 @@ def rooted_forest(roots: Floats, capacity: int) -> Forest:
     return forest
 
 
-def grown_forest(forest: Forest) -> Forest:
-    """Return the same trees with twice the room, whatever they ran out of."""
+def enlarged_forest(forest: ForestArrays) -> ForestArrays:
+    """Return the same trees with room for twice as many nodes."""
     n, capacity = int(forest.nodes[0]), 2 * len(forest.parent)
     return forest._replace(
-        q=grown(forest.q, n, capacity),
-        parent=grown(forest.parent, n, capacity),
-        cost=grown(forest.cost, n, capacity),
-        number=grown(forest.number, n, capacity),
-        neighbours=grown_kdtree(forest.neighbours, capacity),
+        q=enlarged(forest.q, n, capacity),
+        parent=enlarged(forest.parent, n, capacity),
+        cost=enlarged(forest.cost, n, capacity),
+        number=enlarged(forest.number, n, capacity),
+        neighbours=enlarged_kdtree(forest.neighbours, capacity),
     )
 
 
-def grown(column: NDArray[Any], n: int, capacity: int) -> NDArray[Any]:
-    """Return a column with its first n rows and room for `capacity`."""
-    larger = np.empty((capacity, *column.shape[1:]), column.dtype)
-    larger[:n] = column[:n]
-    return larger
-
-
 @inline_helper
-def fits(forest: Forest, nodes: int) -> bool:
-    """Whether so many more nodes fit, and one of them among the neighbours."""
+def fits(forest: ForestArrays, nodes: int) -> bool:
+    """Whether so many more nodes fit, and at least one into the k-d trees."""
     return int(forest.nodes[0]) + nodes <= len(forest.parent) and has_room(forest.neighbours)
 
 
 @inline_helper
 def add(
-    forest: Forest, space: Any, log: Buffer, iteration: int, tree: int, parent: int, Q: Floats,
+    forest: ForestArrays,
+    space: Any,
+    log: Buffer,
+    iteration: int,
+    tree: int,
+    parent: int,
+    Q: Floats,
     row: int,
-) -> int:  # fmt: skip
-    """Join Q[row] to a tree below `parent`, say so, and return the new node."""
+) -> int:
+    """Add Q[row] to a tree as a child of `parent`, emit the edge, and return the new node."""
     node = int(forest.nodes[0])
     for k in range(len(space.lower)):
         forest.q[node, k] = Q[row, k]
@@ -97,21 +94,21 @@ def add(
     insert(forest.neighbours, space, forest.q, node, tree)
     forest.nodes[0] += 1
     forest.nodes[1 + tree] += 1
-    above = forest.number[parent]
-    emit(log, _EDGE, iteration, tree, forest.number[node], above, forest.cost[node], Q, row)
+    number, parent_number = forest.number[node], forest.number[parent]
+    emit_edge(log, iteration, tree, number, parent_number, forest.cost[node], Q, row)
     return node
 
 
 @inline_helper
-def emit_roots(forest: Forest, log: Buffer) -> None:
-    """Say where the trees begin."""
+def emit_roots(forest: ForestArrays, log: Buffer) -> None:
+    """Emit the roots of the trees."""
     for root in range(len(forest.nodes) - 1):
-        emit(log, _EDGE, 0, root, 0, -1, 0.0, forest.q, root)
+        emit_edge(log, 0, root, 0, -1, 0.0, forest.q, root)
 
 
 @inline_helper
-def _depth(forest: Forest, node: int) -> int:
-    """Nodes from a root to `node`, both included; 0 for no node."""
+def _depth(forest: ForestArrays, node: int) -> int:
+    """Number of nodes from the root to `node`, both included; 0 for node -1."""
     depth = 0
     while node >= 0:
         depth += 1
@@ -120,24 +117,29 @@ def _depth(forest: Forest, node: int) -> int:
 
 
 @inline_helper
-def emit_path(
-    forest: Forest, log: Buffer, iteration: int, stage: int, cost: float, start: int, goal: int
+def emit_tree_path(
+    forest: ForestArrays,
+    log: Buffer,
+    iteration: int,
+    stage: int,
+    cost: float,
+    start: int,
+    goal: int,
 ) -> int:
-    """Say that there is a path from the root of one tree to `start`, and on over `goal`.
+    """Emit the path from the root of one tree to `start`, and from `goal` to the other root.
 
     Args:
         forest: The trees.
         log: Events.
         iteration: The planner's count.
         stage: A `Stage`.
-        cost: Its length.
-        start: A node of the tree that begins at the start.
-        goal: A node of the other tree, from which it leads down to the root; -1 for none. Where it
-            coincides with `start`, it is left out.
+        cost: Length of the path.
+        start: A node of the tree that is rooted at the start.
+        goal: A node of the other tree; -1 if there is one tree. It is left out if it has the same
+            configuration as `start`.
 
     Returns:
-        0, or how many waypoints it has where these do not fit into the log any more; then nothing
-        was said.
+        0, or the number of waypoints if the log has no room for them and nothing was emitted.
     """
     there, back = _depth(forest, start), _depth(forest, goal)
     if goal >= 0:
@@ -158,5 +160,5 @@ def emit_path(
         for k in range(forest.q.shape[1]):
             log.points[first + i, k] = forest.q[goal, k]
         goal = forest.parent[goal]
-    emit(log, _PATH, iteration, stage, first, n, cost, forest.q, 0)
+    emit_path(log, iteration, stage, cost, first, n)
     return 0

@@ -82,7 +82,7 @@ def rooted_kdtree(roots: Floats, capacity: int) -> KdTree:
     return tree
 
 
-def grown_kdtree(tree: KdTree, capacity: int) -> KdTree:
+def enlarged_kdtree(tree: KdTree, capacity: int) -> KdTree:
     """Return the same tree with room for `capacity` nodes."""
     larger = _empty_kdtree(tree.points.shape[1], capacity)
     cells, buckets = int(tree.counts[_CELLS]), int(tree.counts[_BUCKETS])

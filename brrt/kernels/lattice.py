@@ -1,69 +1,78 @@
-"""A lattice of cells around the start, found as they are needed, and the best-first search on it.
+"""A lattice of cells around the start and best-first search on it.
 
-Cells are implicit: integer coordinates from the start, packed into one key, behind a hash table.
-What is found about a cell's neighbours is kept, so that a second visit checks no motion.
+Cells are found as they are needed: a hash table maps their integer coordinates from the start,
+packed into one key, to their numbers. The neighbours of a cell are kept, so that no motion is
+checked twice.
 """
 
 from itertools import combinations, product
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Stage
-from brrt.kernels.emit import Buffer, emit, point_room, room, take_points
+from brrt.events import Reason, Stage
+from brrt.kernels.arrays import enlarged
+from brrt.kernels.emit import (
+    Buffer,
+    emit_expand,
+    emit_path,
+    emit_reject,
+    point_room,
+    room,
+    take_points,
+)
 from brrt.kernels.jit import helper, inline_helper
 from brrt.kernels.space import distance, segment_free
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Longs = NDArray[np.int64]
-Columns = TypeVar("Columns", "Lattice", "Search")
 
-EXPAND, REJECT = int(Kind.EXPAND), int(Kind.REJECT)
-_PATH, _RAW = int(Kind.PATH), int(Stage.RAW)
-COLLISION, LIMITS = int(Reason.COLLISION), int(Reason.LIMITS)
+_RAW, _COLLISION, _LIMITS = int(Stage.RAW), int(Reason.COLLISION), int(Reason.LIMITS)
 
-MOST_CELLS = 1 << 19
-"""Cells along a side of the bounds, at most: coordinates stay within half of what a key holds."""
+MAX_CELLS = 1 << 19
+"""Most cells along a side of the bounds: coordinates use at most half of a key's range."""
 
 BLOCKED = -1
+"""In place of a neighbour: the motion to it is not free."""
 
 UNSEEN, SPREAD, ARRIVES = range(3)
-"""What is known of a cell: nothing; its neighbours; that the goal can be reached from it."""
+"""State of a cell: nothing is known; its neighbours are; the goal is reachable by one motion."""
 
 CELLS, HASHED, EXPANDED = range(3)
-"""Places in `Lattice.counts`."""
+"""Places in `LatticeArrays.counts`."""
 
 SEARCH, HEAPED = range(2)
-"""Places in `Search.counts`."""
+"""Places in `SearchArrays.counts`."""
 
 _OPEN, _CLOSED, _MARKS = range(3)
-"""What `Search.mark` adds to the search's number, and the stride of these numbers."""
+"""A cell's mark is the number of the search times `_MARKS`, plus `_OPEN` or `_CLOSED`."""
 
 _BITS = 21
 _OFFSET = 1 << (_BITS - 1)
 _MASK = (1 << _BITS) - 1
 _SCATTER = 0x1E3779B97F4A7C15
-"""2^64 over the golden ratio (Knuth 1973, 6.4) less its highest bit, which would not fit."""
+"""2^64 divided by the golden ratio (Knuth 1973, 6.4), without its highest bit to fit int64."""
 
 
-class Lattice(NamedTuple):
-    """What is known of the lattice; a cell is numbered 0 (the start's), 1, 2 ... as first seen.
+class LatticeArrays(NamedTuple):
+    """The cells of a lattice, numbered 0 (the start), 1, 2 ... in the order of discovery.
 
     Attributes:
-        keys: Each cell's coordinates, 21 bits an axis, shape (capacity,).
-        q: Each cell's position, shape (capacity, d); the row after the last is scratch.
+        keys: Coordinates of each cell, 21 bits an axis, shape (capacity,).
+        q: Position of each cell, shape (capacity, d); the row after the last is work space.
         h: Estimate of each cell's cost to the goal, shape (capacity,).
-        near: Each cell's neighbours in the order of the directions, or `BLOCKED`; known once the
-            cell is `SPREAD`; shape (capacity, directions).
-        known: What is known of each cell, shape (capacity,).
-        slots: Hash table: a cell's number plus 1, or 0; a power of two, at least twice as many.
-        counts: Cells, cells entered into `slots`, and cells whose neighbours are known; shape (3,).
+        near: Neighbours of each `SPREAD` cell in the order of the directions, or `BLOCKED`; shape
+            (capacity, directions).
+        known: State of each cell, shape (capacity,).
+        slots: Hash table of cell numbers plus 1, 0 in free slots; its length is a power of two, at
+            least twice the capacity.
+        counts: Number of cells, of cells in `slots`, and of `SPREAD` cells; shape (3,).
         goal: The goal, shape (1, d).
-        deltas: What each direction adds to a key, shape (directions,).
+        deltas: Difference of a neighbour's key in each direction, shape (directions,).
         costs: Length of a motion in each direction, shape (directions,).
-        opposite: The direction that leads back, shape (directions,).
+        opposite: The opposite of each direction, shape (directions,).
         epsilon: Edge of a cell.
         max_move: The goal is reached by a straight motion of at most this length.
     """
@@ -83,18 +92,20 @@ class Lattice(NamedTuple):
     max_move: float
 
 
-class Search(NamedTuple):
-    """A best-first search: A*'s only one, or one of those before each of LRTA*'s moves.
+class SearchArrays(NamedTuple):
+    """A best-first search: the one of A*, or the latest lookahead of LRTA*.
+
+    The open list is a binary heap. A cell that is reached at a lower cost is entered again, and its
+    earlier entry is dropped when it is popped.
 
     Attributes:
-        g: Cost of each cell from the search's first, shape (capacity,).
-        parent: The cell that each was reached from, or -1, shape (capacity,).
-        mark: Which search saw the cell last, and whether it closed it, shape (capacity,).
-        heap_f: g + h of what is open, a binary heap, shape (heap,). A cell that is reached at
-            less cost is entered again; what is left of the earlier entry is dropped on its way out.
-        heap_h: Its estimate, shape (heap,).
-        heap_cell: Its cell, shape (heap,).
-        counts: Number of this search, and entries of the heap; shape (2,).
+        g: Cost of each cell from the search's first cell, shape (capacity,).
+        parent: Cell that each cell was reached from, or -1, shape (capacity,).
+        mark: Search that reached each cell last, and whether it closed it, shape (capacity,).
+        heap_f: g + h of each entry of the heap, shape (heap,).
+        heap_h: h of each entry, shape (heap,).
+        heap_cell: Cell of each entry, shape (heap,).
+        counts: Number of this search, and number of entries of the heap; shape (2,).
     """
 
     g: Floats
@@ -107,9 +118,9 @@ class Search(NamedTuple):
 
 
 def directions(dim: int, *, diagonals: bool) -> list[tuple[int, ...]]:
-    """Steps to a cell's neighbours, in the order in which they are looked at.
+    """Steps to a cell's neighbours, in the order in which they are checked.
 
-    Those along one axis come first, +x, -x, +y, -y, +z, -z; then those along two, then three.
+    Steps along one axis come first, +x, -x, +y, -y, +z, -z; then those along two axes, then three.
     """
     return [
         tuple(signs[axes.index(k)] if k in axes else 0 for k in range(dim))
@@ -121,20 +132,20 @@ def directions(dim: int, *, diagonals: bool) -> list[tuple[int, ...]]:
 
 def rooted_lattice(
     start: Floats, goal: Floats, epsilon: float, max_move: float, capacity: int, *, diagonals: bool
-) -> Lattice:
-    """Make a lattice that knows the start's cell alone.
+) -> LatticeArrays:
+    """Make a lattice whose only cell is the start.
 
     Args:
-        start: Origin, shape (d,).
-        goal: Where to, shape (d,).
+        start: Start, shape (d,).
+        goal: Goal, shape (d,).
         epsilon: Edge of a cell.
         max_move: Longest motion to the goal.
-        capacity: Cells to make room for; memory is taken only as they come.
-        diagonals: Whether cells that share a corner or an edge are neighbours.
+        capacity: Number of cells to make room for.
+        diagonals: Whether cells that share only a corner or an edge are neighbours.
     """
     steps = directions(len(start), diagonals=diagonals)
     capacity = max(capacity, 2 * len(steps) + 2)
-    lattice = Lattice(
+    lattice = LatticeArrays(
         keys=np.empty(capacity, np.int64),
         q=np.empty((capacity, len(start))),
         h=np.empty(capacity),
@@ -151,7 +162,7 @@ def rooted_lattice(
     )
     lattice.keys[0] = sum(_OFFSET << _BITS * k for k in range(len(start)))
     lattice.q[0], lattice.known[0] = start, UNSEEN
-    # Summed as kernels sum, so that equal positions have equal distances.
+    # Sum like the kernels, so that equal positions have equal distances.
     square = 0.0
     for a, b in zip(start.tolist(), goal.tolist(), strict=True):
         square += (b - a) * (b - a)
@@ -159,9 +170,9 @@ def rooted_lattice(
     return lattice
 
 
-def empty_search(capacity: int) -> Search:
-    """Make room for a search among so many cells."""
-    return Search(
+def empty_search(capacity: int) -> SearchArrays:
+    """Return a search with room for so many cells."""
+    return SearchArrays(
         g=np.empty(capacity),
         parent=np.empty(capacity, np.int32),
         mark=np.zeros(capacity, np.int64),
@@ -172,47 +183,46 @@ def empty_search(capacity: int) -> Search:
     )
 
 
-def grown_lattice(lattice: Lattice) -> Lattice:
-    """Return the same lattice with twice the room; kernels fill its hash table anew."""
-    larger = _doubled(lattice, ("keys", "q", "h", "near", "known"))
+def enlarged_lattice(lattice: LatticeArrays) -> LatticeArrays:
+    """Return the same lattice with twice the room; kernels fill its hash table again."""
+    larger = lattice._replace(**_doubled(lattice, ("keys", "q", "h", "near", "known")))
     larger.counts[HASHED] = 0
     return larger._replace(slots=_slots(len(larger.keys)))
 
 
-def grown_search(search: Search) -> Search:
+def enlarged_search(search: SearchArrays) -> SearchArrays:
     """Return the same search with twice the room."""
-    return _doubled(search, ("g", "parent", "mark", "heap_f", "heap_h", "heap_cell"))
+    names = ("g", "parent", "mark", "heap_f", "heap_h", "heap_cell")
+    return search._replace(**_doubled(search, names))
 
 
 def _slots(capacity: int) -> Ints:
     return np.zeros(1 << (2 * capacity - 1).bit_length(), np.int32)
 
 
-def _doubled(columns: Columns, names: tuple[str, ...]) -> Columns:
-    larger: dict[str, Any] = {}
-    for name in names:
-        old: NDArray[Any] = getattr(columns, name)
-        larger[name] = np.zeros((2 * len(old), *old.shape[1:]), old.dtype)
-        larger[name][: len(old)] = old
-    return columns._replace(**larger)
+def _doubled(arrays: LatticeArrays | SearchArrays, names: tuple[str, ...]) -> dict[str, Any]:
+    columns = {name: getattr(arrays, name) for name in names}
+    return {
+        name: enlarged(column, len(column), 2 * len(column)) for name, column in columns.items()
+    }
 
 
 @inline_helper
-def lattice_has_room(lattice: Lattice) -> bool:
+def lattice_has_room(lattice: LatticeArrays) -> bool:
     """Whether all neighbours of a cell fit."""
     return int(lattice.counts[CELLS]) + len(lattice.deltas) < len(lattice.keys)
 
 
 @inline_helper
-def search_has_room(search: Search, lattice: Lattice) -> bool:
-    """Whether all neighbours of a cell can be opened."""
+def search_has_room(search: SearchArrays, lattice: LatticeArrays) -> bool:
+    """Whether all neighbours of a cell fit into the heap, and all cells into the search."""
     enough = int(search.counts[HEAPED]) + len(lattice.deltas) <= len(search.heap_cell)
     return enough and len(search.mark) == len(lattice.keys)
 
 
 @inline_helper
-def _place(lattice: Lattice, key: int) -> int:
-    """Find the slot of a key: where its cell stands, or the free one where it belongs."""
+def _place(lattice: LatticeArrays, key: int) -> int:
+    """Return the slot that holds a key's cell, or the free one for it."""
     slots, keys = lattice.slots, lattice.keys
     last = len(slots) - 1
     place = ((key * _SCATTER) >> 32) & last
@@ -222,8 +232,8 @@ def _place(lattice: Lattice, key: int) -> int:
 
 
 @helper
-def enter_cells(lattice: Lattice) -> None:
-    """Enter into the hash table what is not in it yet: the start, or all after it grew."""
+def enter_cells(lattice: LatticeArrays) -> None:
+    """Enter the cells that are missing into the hash table: the start, or all once enlarged."""
     counts = lattice.counts
     while counts[HASHED] < counts[CELLS]:
         cell = int(counts[HASHED])
@@ -232,11 +242,13 @@ def enter_cells(lattice: Lattice) -> None:
 
 
 @helper
-def look(lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int) -> None:
-    """See whether the goal can be reached from a cell; if not, find its neighbours.
+def find_neighbours(
+    lattice: LatticeArrays, space: Any, log: Buffer, cell: int, iteration: int
+) -> None:
+    """Check whether the goal is reachable from a cell by one motion; if not, find its neighbours.
 
-    A motion is checked once, from the cell of the lesser key, so that both its ends see the same.
-    Each neighbour that cannot be reached is reported. The caller saw to it that there is room.
+    A motion is checked once, from the cell with the lesser key, so that the result is the same for
+    both cells. Each neighbour that is not reachable is rejected. The log must have room for all.
     """
     q, counts = lattice.q, lattice.counts
     if lattice.h[cell] <= lattice.max_move and segment_free(space, q, cell, lattice.goal, 0):
@@ -249,7 +261,7 @@ def look(lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int) -
         seen, reason = other >= 0, BLOCKED
         if seen and lattice.known[other] == SPREAD:
             if lattice.near[other, lattice.opposite[k]] == BLOCKED:
-                reason = COLLISION
+                reason = _COLLISION
         else:
             if not seen:
                 other = int(counts[CELLS])
@@ -258,16 +270,16 @@ def look(lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int) -
                     x = q[0, axis] + lattice.epsilon * along
                     q[other, axis] = x
                     if x < space.lower[axis] or x > space.upper[axis]:
-                        reason = LIMITS
+                        reason = _LIMITS
             if reason == BLOCKED:
                 first, second = cell, other
                 if lattice.deltas[k] < 0:
                     first, second = other, cell
                 if not segment_free(space, q, first, q, second):
-                    reason = COLLISION
+                    reason = _COLLISION
         if reason != BLOCKED:
             lattice.near[cell, k] = BLOCKED
-            emit(log, REJECT, iteration, 0, cell, reason, 0.0, q, other)
+            emit_reject(log, iteration, 0, cell, reason, q, other)
             continue
         lattice.near[cell, k] = other
         if not seen:
@@ -281,17 +293,17 @@ def look(lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int) -
 
 
 @inline_helper
-def exhausted(lattice: Lattice) -> bool:
-    """Whether all that can be reached has been seen, and the goal from nowhere.
+def exhausted(lattice: LatticeArrays) -> bool:
+    """Whether all reachable cells are `SPREAD`, so that the goal is not reachable.
 
-    Motions lead both ways, so a goal that had been in reach once would still be.
+    Motions can be reversed, so a goal that was reachable before still is.
     """
     return bool(lattice.counts[EXPANDED] == lattice.counts[CELLS])
 
 
 @inline_helper
-def _before(f: float, h: float, cell: int, search: Search, at: int) -> bool:
-    """Whether an entry goes before another: less f, then less h, then the lesser number."""
+def _before(f: float, h: float, cell: int, search: SearchArrays, at: int) -> bool:
+    """Whether an entry precedes another one: by f, then by h, then by the cell's number."""
     if f != search.heap_f[at]:
         return bool(f < search.heap_f[at])
     if h != search.heap_h[at]:
@@ -300,13 +312,13 @@ def _before(f: float, h: float, cell: int, search: Search, at: int) -> bool:
 
 
 @inline_helper
-def _put(search: Search, at: int, f: float, h: float, cell: int) -> None:
+def _put(search: SearchArrays, at: int, f: float, h: float, cell: int) -> None:
     search.heap_f[at], search.heap_h[at], search.heap_cell[at] = f, h, cell
 
 
 @inline_helper
-def push(search: Search, f: float, h: float, cell: int) -> None:
-    """Enter a cell into the heap."""
+def push(search: SearchArrays, f: float, h: float, cell: int) -> None:
+    """Push a cell onto the heap."""
     at = int(search.counts[HEAPED])
     search.counts[HEAPED] = at + 1
     while at > 0:
@@ -319,8 +331,8 @@ def push(search: Search, f: float, h: float, cell: int) -> None:
 
 
 @inline_helper
-def pop(search: Search) -> int:
-    """Take the first cell from the heap."""
+def pop(search: SearchArrays) -> int:
+    """Pop the first cell of the heap."""
     top = int(search.heap_cell[0])
     n = int(search.counts[HEAPED]) - 1
     search.counts[HEAPED] = n
@@ -340,8 +352,8 @@ def pop(search: Search) -> int:
 
 
 @inline_helper
-def begin(search: Search, lattice: Lattice, root: int) -> None:
-    """Begin a search at a cell."""
+def begin(search: SearchArrays, lattice: LatticeArrays, root: int) -> None:
+    """Begin a new search at a cell."""
     search.counts[SEARCH] += 1
     search.counts[HEAPED] = 0
     search.g[root], search.parent[root] = 0.0, -1
@@ -350,14 +362,14 @@ def begin(search: Search, lattice: Lattice, root: int) -> None:
 
 
 @inline_helper
-def is_closed(search: Search, cell: int) -> bool:
-    """Whether this search expanded a cell."""
+def is_closed(search: SearchArrays, cell: int) -> bool:
+    """Whether this search has expanded a cell."""
     return bool(search.mark[cell] == search.counts[SEARCH] * _MARKS + _CLOSED)
 
 
 @inline_helper
-def best_open(search: Search) -> int:
-    """Return the cell to expand next, or -1 where there is none."""
+def best_open(search: SearchArrays) -> int:
+    """Return the cell to expand next, or -1 if there is none."""
     while search.counts[HEAPED] > 0:
         if not is_closed(search, search.heap_cell[0]):
             return int(search.heap_cell[0])
@@ -367,12 +379,12 @@ def best_open(search: Search) -> int:
 
 @inline_helper
 def expand(
-    search: Search, lattice: Lattice, space: Any, log: Buffer, cell: int, iteration: int
+    search: SearchArrays, lattice: LatticeArrays, space: Any, log: Buffer, cell: int, iteration: int
 ) -> bool:
-    """Expand the cell that `best_open` returned; return whether the goal is in reach from it."""
-    emit(log, EXPAND, iteration, cell, search.parent[cell], 0, search.g[cell], lattice.q, cell)
+    """Expand the cell that `best_open` returned; return whether the goal is reachable from it."""
+    emit_expand(log, iteration, cell, search.parent[cell], search.g[cell], lattice.q, cell)
     if lattice.known[cell] == UNSEEN:
-        look(lattice, space, log, cell, iteration)
+        find_neighbours(lattice, space, log, cell, iteration)
     if lattice.known[cell] == ARRIVES:
         return True
     pop(search)
@@ -390,13 +402,13 @@ def expand(
 
 
 @inline_helper
-def emit_way(
-    lattice: Lattice, log: Buffer, iteration: int, cells: Ints, n: int, cost: float
+def emit_cell_path(
+    lattice: LatticeArrays, log: Buffer, iteration: int, cells: Ints, n: int, cost: float
 ) -> int:
-    """Say that there is a path along the first n cells, where `BLOCKED` stands for the goal.
+    """Emit the path along the first n cells, among which `BLOCKED` means the goal.
 
     Returns:
-        0, or n where so many waypoints do not fit into the log any more; then nothing was said.
+        0, or n if the log has no room for so many waypoints and nothing was emitted.
     """
     if room(log) < 2 or point_room(log) < n:
         return n
@@ -405,5 +417,5 @@ def emit_way(
         for k in range(lattice.q.shape[1]):
             at_goal = cells[i] == BLOCKED
             log.points[first + i, k] = lattice.goal[0, k] if at_goal else lattice.q[cells[i], k]
-    emit(log, _PATH, iteration, _RAW, first, n, cost, lattice.q, 0)
+    emit_path(log, iteration, _RAW, cost, first, n)
     return 0

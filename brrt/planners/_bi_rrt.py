@@ -1,8 +1,8 @@
-"""The compiled loop of bidirectional RRT, for every variant of it.
+"""The compiled loop of bidirectional RRT, for all of its variants.
 
-Each pass of the loop makes one extension: of one tree towards the sample, or of the other towards
-the newest node of the first. So it can stop between any two, and each kernel that it calls is
-compiled into it once.
+Each pass of the loop makes one extension: of one tree towards the sample, or of the other tree
+towards the newest node of the first. So it can stop between any two extensions, and each helper is
+compiled into it only once.
 """
 
 from typing import Any, NamedTuple
@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Reason, Source, Stage, Status
-from brrt.kernels.emit import Buffer, emit, emit_end, room
-from brrt.kernels.forest import Forest, add, emit_path, emit_roots, fits
+from brrt.events import Reason, Source, Stage, Status
+from brrt.kernels.emit import Buffer, emit_connect, emit_plan_end, emit_reject, emit_sample, room
+from brrt.kernels.forest import ForestArrays, add, emit_roots, emit_tree_path, fits
 from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.kdtree import nearest
 from brrt.kernels.random import Random, uniform
@@ -31,30 +31,29 @@ from brrt.planners.base.kernel_planner import (
 Floats = NDArray[np.float64]
 
 SOLVED = int(Status.SOLVED)
-REJECT, SAMPLE, CONNECT = int(Kind.REJECT), int(Kind.SAMPLE), int(Kind.CONNECT)
 UNIFORM, OTHER_TREE = int(Source.UNIFORM), int(Source.OTHER_TREE)
 COLLISION, NO_PROGRESS = int(Reason.COLLISION), int(Reason.NO_PROGRESS)
 LINK_BLOCKED, RAW = int(Reason.LINK_BLOCKED), int(Stage.RAW)
 
 ALTERNATE, SMALLER, COIN = range(3)
-"""Whose turn it is; see `BiRRT.turn`."""
+"""Which tree grows; see `BiRRT.turn`."""
 
 STAGE, TURN, TREE, FROM, GREW, NEWEST = range(OWN, OWN + 6)
-"""Places in `Trees.counts`: what is under way, the tree whose turn it is, the tree that is being
-extended, the node that its next extension leaves from or -1 while that is to be found, whether
-this iteration added a node, and from here on the newest node of each tree (two places)."""
+"""Places in `BiRRTState.counts`: the stage, the tree whose turn it is, the tree that is being
+extended, the node to extend it from or -1 if it has to be found, whether this iteration added a
+node, and from here on the newest node of each tree (two places)."""
 COUNTS = NEWEST + 2
 
 _BEGIN, _DRAW, _GROW, _LINK, _DONE = range(5)
-"""Stages: say where the trees begin, draw a sample, grow towards it, link the other tree to what
-has grown, say what the path is."""
+"""Stages: emit the roots, draw a sample, extend a tree towards it, extend the other tree towards
+the newest node, emit the path."""
 
 _TARGET, _NEW = range(2)
-"""Rows of `Trees.scratch`: what an extension heads for, and the new node."""
+"""Rows of `BiRRTState.scratch`: the configuration that an extension heads for, and the new node."""
 
 
-class Options(NamedTuple):
-    """What of the settings the loop needs; see `BiRRT`."""
+class BiRRTOptions(NamedTuple):
+    """The settings that the loop needs; see `BiRRT`."""
 
     step: float
     grow_connects: bool
@@ -63,26 +62,26 @@ class Options(NamedTuple):
     always_link: bool
 
 
-class Trees(NamedTuple):
-    """Both trees so far, and the loop's place in them.
+class BiRRTState(NamedTuple):
+    """Both trees and the state of the loop.
 
     Attributes:
         forest: Tree 0 grows from the start, tree 1 from the goal.
-        counts: See `drive` and above, shape (COUNTS,).
+        counts: See `kernel_planner` and above, shape (COUNTS,).
         cost: Cost of the path, once there is one, shape (1,).
         scratch: The target and the new node, shape (2, dof).
     """
 
-    forest: Forest
+    forest: ForestArrays
     counts: NDArray[np.int64]
     cost: Floats
     scratch: Floats
 
 
 @inline_helper
-def draw(trees: Trees, space: Any, rng: Random, log: Buffer, options: Options) -> int:
-    """Choose a tree and what it heads for; return the stage that begins."""
-    counts, sizes = trees.counts, trees.forest.nodes
+def draw(state: BiRRTState, space: Any, rng: Random, log: Buffer, options: BiRRTOptions) -> int:
+    """Choose a tree and its target; return the next stage."""
+    counts, sizes = state.counts, state.forest.nodes
     counts[DRAWS] += 1
     counts[FROM], counts[GREW] = -1, 0
     stage, source = _GROW, UNIFORM
@@ -94,58 +93,58 @@ def draw(trees: Trees, space: Any, rng: Random, log: Buffer, options: Options) -
         counts[TURN] = 1 - counts[TURN]
     counts[TREE] = counts[TURN]
     if stage == _GROW:
-        sample_uniform(space, rng, trees.scratch, _TARGET)
+        sample_uniform(space, rng, state.scratch, _TARGET)
     else:
-        aim_at_newest(trees, space, 1 - counts[TREE])
-    emit(log, SAMPLE, counts[DRAWS], counts[TREE], source, 0, 0.0, trees.scratch, _TARGET)
+        target_newest(state, space, 1 - counts[TREE])
+    emit_sample(log, counts[DRAWS], counts[TREE], source, state.scratch, _TARGET)
     return stage
 
 
 @inline_helper
-def aim_at_newest(trees: Trees, space: Any, tree: int) -> None:
-    """Let the next extensions head for a tree's newest node."""
+def target_newest(state: BiRRTState, space: Any, tree: int) -> None:
+    """Make a tree's newest node the target of the next extensions."""
     for k in range(len(space.lower)):
-        trees.scratch[_TARGET, k] = trees.forest.q[trees.counts[NEWEST + tree], k]
+        state.scratch[_TARGET, k] = state.forest.q[state.counts[NEWEST + tree], k]
 
 
 @inline_helper
-def connect(trees: Trees, log: Buffer, tree: int, node: int, far: float) -> None:
-    """Say that `node` of a tree has met the newest node of the other one."""
-    forest, counts = trees.forest, trees.counts
+def connect(state: BiRRTState, log: Buffer, tree: int, node: int, far: float) -> None:
+    """Connect `node` of a tree and the newest node of the other tree."""
+    forest, counts = state.forest, state.counts
     counts[NEWEST + tree] = node
     start, goal = counts[NEWEST], counts[NEWEST + 1]
     cost = forest.cost[start] + far + forest.cost[goal]
-    trees.cost[0] = cost
+    state.cost[0] = cost
     start, goal = forest.number[start], forest.number[goal]
-    emit(log, CONNECT, counts[DRAWS], start, goal, 0, cost, trees.scratch, _NEW)
+    emit_connect(log, counts[DRAWS], start, goal, cost)
 
 
 @kernel
 def advance(
-    trees: Trees,
+    state: BiRRTState,
     space: Any,
     rng: Random,
     log: Buffer,
-    options: Options,
+    options: BiRRTOptions,
     limit: int,
     draw_limit: int,
 ) -> int:
     """Run until solved, out of room, or until `limit` iterations or `draw_limit` draws are made."""
-    forest, counts, scratch = trees.forest, trees.counts, trees.scratch
+    forest, counts, scratch = state.forest, state.counts, state.scratch
     if counts[STAGE] == _BEGIN:
         emit_roots(forest, log)
         counts[STAGE] = _DRAW
         if distance(space, forest.q, 0, forest.q, 1) <= options.step:
-            # Trees that are within reach from the beginning are joined without a draw.
+            # If the roots are within reach of each other, connect them without a draw.
             counts[STAGE], counts[TREE], counts[FROM] = _LINK, 1, 1
     while True:
         if counts[STAGE] == _DONE:
             start, goal = counts[NEWEST], counts[NEWEST + 1]
-            cost = trees.cost[0]
-            counts[POINTS] = emit_path(forest, log, counts[DRAWS], RAW, cost, start, goal)
+            cost = state.cost[0]
+            counts[POINTS] = emit_tree_path(forest, log, counts[DRAWS], RAW, cost, start, goal)
             if counts[POINTS] > 0:
                 return BATCH_FULL
-            emit_end(log, counts[DRAWS], SOLVED)
+            emit_plan_end(log, counts[DRAWS], SOLVED)
             return ENDED
         if room(log) < 2:
             return BATCH_FULL
@@ -154,7 +153,7 @@ def advance(
         if counts[STAGE] == _DRAW:
             if counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit:
                 return LIMIT
-            counts[STAGE] = draw(trees, space, rng, log, options)
+            counts[STAGE] = draw(state, space, rng, log, options)
         linking = counts[STAGE] == _LINK
         tree = counts[TREE]
         if counts[FROM] < 0:
@@ -171,9 +170,9 @@ def advance(
             reason = LINK_BLOCKED if linking and reached else COLLISION
         if reason >= 0:
             number = forest.number[near]
-            emit(log, REJECT, counts[DRAWS], tree, number, reason, 0.0, scratch, _NEW)
+            emit_reject(log, counts[DRAWS], tree, number, reason, scratch, _NEW)
         elif linking and reached:
-            connect(trees, log, tree, near, far)
+            connect(state, log, tree, near, far)
             counts[STAGE] = _DONE
             continue
         else:
@@ -184,7 +183,7 @@ def advance(
         if more:
             continue
         if not linking and options.turn != COIN and (counts[GREW] or options.always_link):
-            aim_at_newest(trees, space, tree)
+            target_newest(state, space, tree)
             counts[STAGE], counts[TREE], counts[FROM] = _LINK, 1 - tree, -1
         else:
             counts[STAGE] = _DRAW

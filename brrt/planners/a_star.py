@@ -7,11 +7,11 @@ import numpy as np
 
 from brrt.errors import BrrtError
 from brrt.kernels.lattice import (
-    MOST_CELLS,
-    Lattice,
+    MAX_CELLS,
+    LatticeArrays,
     empty_search,
-    grown_lattice,
-    grown_search,
+    enlarged_lattice,
+    enlarged_search,
     rooted_lattice,
 )
 from brrt.planners import _a_star
@@ -41,7 +41,7 @@ class LatticePlanner(KernelPlanner):
     diagonals: bool = param(False, "move to all cells around (26 in 3D), not across faces alone")
     max_move: float = param(1.0, "the goal is reached by a straight move of at most this", low=0)
 
-    def _lattice(self, problem: Problem) -> Lattice:
+    def _lattice(self, problem: Problem) -> LatticeArrays:
         """Make the lattice that knows the start alone.
 
         Raises:
@@ -52,7 +52,7 @@ class LatticePlanner(KernelPlanner):
                 "planners on a lattice move a point; use --robot point, or --planner rrt for "
                 "this robot"
             )
-        least = problem.world.extent / MOST_CELLS
+        least = problem.world.extent / MAX_CELLS
         if self.epsilon < least:
             raise BrrtError(
                 f"epsilon {self.epsilon:g} is too small for this world; "
@@ -80,15 +80,15 @@ class AStar(LatticePlanner):
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
         """See `KernelPlanner.loop`."""
         lattice = self._lattice(problem)
-        frontier = _a_star.Frontier(
+        state = _a_star.AStarState(
             lattice, empty_search(len(lattice.keys)), np.zeros(_a_star.COUNTS, np.int64)
         )
-        frontier.counts[_a_star.LAST] = -1
+        state.counts[_a_star.LAST] = -1
         most = len(lattice.deltas) + 1
-        return Kernel(_a_star.advance, frontier, _a_star.Options(), _grown, most, MOST_DRAWS)
+        return Kernel(_a_star.advance, state, _a_star.AStarOptions(), _enlarged, most, MOST_DRAWS)
 
 
-def _grown(frontier: _a_star.Frontier) -> _a_star.Frontier:
-    return frontier._replace(
-        lattice=grown_lattice(frontier.lattice), search=grown_search(frontier.search)
+def _enlarged(state: _a_star.AStarState) -> _a_star.AStarState:
+    return state._replace(
+        lattice=enlarged_lattice(state.lattice), search=enlarged_search(state.search)
     )

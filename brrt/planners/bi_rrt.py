@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from brrt.kernels.forest import RESERVED_NODES, grown_forest, rooted_forest
+from brrt.kernels.forest import RESERVED_NODES, enlarged_forest, rooted_forest
 from brrt.planners import _bi_rrt
 from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
@@ -59,7 +59,7 @@ class BiRRT(KernelPlanner):
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """See `KernelPlanner.loop`."""
         step = step_length(self.step, problem)
-        options = _bi_rrt.Options(
+        options = _bi_rrt.BiRRTOptions(
             step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
             self.always_link,
         )  # fmt: skip
@@ -71,16 +71,18 @@ def step_length(step: float | None, query: Query, part: float = 0.05) -> float:
     return step or part * query.world.extent
 
 
-def loop_of(options: _bi_rrt.Options, problem: Problem, stop: Stop) -> Kernel[_bi_rrt.Trees]:
+def loop_of(
+    options: _bi_rrt.BiRRTOptions, problem: Problem, stop: Stop
+) -> Kernel[_bi_rrt.BiRRTState]:
     """Make the loop of any variant; see `KernelPlanner.loop`."""
     roots = np.array([problem.start, problem.goal])
     counts = np.zeros(_bi_rrt.COUNTS, np.int64)
     counts[_bi_rrt.NEWEST + 1] = 1
-    trees = _bi_rrt.Trees(
+    state = _bi_rrt.BiRRTState(
         rooted_forest(roots, RESERVED_NODES), counts, np.zeros(1), scratch=roots.copy()
     )
-    return Kernel(_bi_rrt.advance, trees, options, _grown, 4, stop.iterations)
+    return Kernel(_bi_rrt.advance, state, options, _enlarged, 4, stop.iterations)
 
 
-def _grown(trees: _bi_rrt.Trees) -> _bi_rrt.Trees:
-    return trees._replace(forest=grown_forest(trees.forest))
+def _enlarged(state: _bi_rrt.BiRRTState) -> _bi_rrt.BiRRTState:
+    return state._replace(forest=enlarged_forest(state.forest))

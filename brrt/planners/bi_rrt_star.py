@@ -29,7 +29,7 @@ class BiRRTStar(StarPlanner):
         None, "longest link between the trees; the step by default", above=0
     )
 
-    def options(self, query: Query) -> _rrt_star.Options:
+    def options(self, query: Query) -> _rrt_star.RRTStarOptions:
         """See `StarPlanner.options`."""
         options = StarPlanner.options(self, query)
         return options._replace(link=self.connect_distance or options.step)

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from brrt.kernels.lattice import empty_search, grown_lattice, grown_search
+from brrt.kernels.lattice import empty_search, enlarged_lattice, enlarged_search
 from brrt.planners import _lrta_star
 from brrt.planners.a_star import MOST_DRAWS, LatticePlanner
 from brrt.planners.base.kernel_planner import UNLIMITED, Kernel
@@ -46,7 +46,7 @@ class LRTAStar(LatticePlanner):
     def retracing(self, problem: Problem) -> Kernel[Any]:
         """See `KernelPlanner.retracing`."""
         loop = self.loop(problem, Stop(iterations=UNLIMITED))
-        return replace(loop, options=loop.options._replace(retraces=True))
+        return replace(loop, options=loop.options._replace(open_ended=True))
 
     def ends_where(self, other: Self) -> bool:
         """See `KernelPlanner.ends_where`."""
@@ -55,24 +55,24 @@ class LRTAStar(LatticePlanner):
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
         """See `KernelPlanner.loop`."""
         lattice = self._lattice(problem)
-        walk = _lrta_star.Walk(
+        state = _lrta_star.LRTAStarState(
             lattice=lattice,
             search=empty_search(len(lattice.keys)),
             trace=np.zeros(_FIRST_MOVES, np.int32),
             closed=np.empty(_MOST_AHEAD, np.int32),
             plan=np.empty(_MOST_AHEAD + 2, np.int32),
-            learnt=np.empty(len(lattice.keys)),
+            learned=np.empty(len(lattice.keys)),
             length=np.zeros(1),
             counts=np.zeros(_lrta_star.COUNTS, np.int64),
         )
-        options = _lrta_star.Options(self.lookahead, self.trials, retraces=False)
+        options = _lrta_star.LRTAStarOptions(self.lookahead, self.trials, open_ended=False)
         most = max(len(lattice.deltas), self.lookahead) + 4
-        return Kernel(_lrta_star.advance, walk, options, _grown, most, MOST_DRAWS)
+        return Kernel(_lrta_star.advance, state, options, _enlarged, most, MOST_DRAWS)
 
 
-def _grown(walk: _lrta_star.Walk) -> _lrta_star.Walk:
-    if walk.counts[_lrta_star.STEP] + 1 >= len(walk.trace):
-        return walk._replace(trace=np.resize(walk.trace, 2 * len(walk.trace)))
-    lattice = grown_lattice(walk.lattice)
-    learnt = np.empty(len(lattice.keys))
-    return walk._replace(lattice=lattice, search=grown_search(walk.search), learnt=learnt)
+def _enlarged(state: _lrta_star.LRTAStarState) -> _lrta_star.LRTAStarState:
+    if state.counts[_lrta_star.STEP] + 1 >= len(state.trace):
+        return state._replace(trace=np.resize(state.trace, 2 * len(state.trace)))
+    lattice = enlarged_lattice(state.lattice)
+    learned = np.empty(len(lattice.keys))
+    return state._replace(lattice=lattice, search=enlarged_search(state.search), learned=learned)

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from brrt.kernels.forest import grown_forest, rooted_forest
+from brrt.kernels.forest import enlarged_forest, rooted_forest
 from brrt.planners import _rrt
 from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
@@ -58,7 +58,7 @@ class RRT(KernelPlanner):
 
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """See `KernelPlanner.loop`."""
-        options = _rrt.Options(
+        options = _rrt.RRTOptions(
             step=self._step(problem),
             goal_bias=self.goal_bias,
             line_of_sight=self.goal_test == "line-of-sight",
@@ -66,17 +66,17 @@ class RRT(KernelPlanner):
             count_failed=self.count_failed,
         )
         roots = problem.start[None]
-        tree = _rrt.Tree(
+        state = _rrt.RRTState(
             forest=rooted_forest(roots, 2 + (stop.iterations + 1) * options.slices),
             counts=np.zeros(_rrt.COUNTS, np.int64),
             scratch=np.array([problem.start, problem.start, problem.goal]),
         )
-        tree.counts[_rrt.GOAL_NODE] = -1
+        state.counts[_rrt.GOAL_NODE] = -1
         draws = 1 if self.count_failed else _DRAWS_PER_ITERATION
         return Kernel(
-            _rrt.advance, tree, options, _grown, options.slices + 4, draws * stop.iterations
+            _rrt.advance, state, options, _enlarged, options.slices + 4, draws * stop.iterations
         )
 
 
-def _grown(tree: _rrt.Tree) -> _rrt.Tree:
-    return tree._replace(forest=grown_forest(tree.forest))
+def _enlarged(state: _rrt.RRTState) -> _rrt.RRTState:
+    return state._replace(forest=enlarged_forest(state.forest))

@@ -6,7 +6,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from brrt.kernels.forest import grown, grown_forest, rooted_forest
+from brrt.kernels.arrays import enlarged
+from brrt.kernels.forest import enlarged_forest, rooted_forest
 from brrt.planners import _rrt_star
 from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
@@ -65,9 +66,9 @@ class StarPlanner(KernelPlanner):
         """See `KernelPlanner.ends_where`."""
         return self.stop_at_first
 
-    def options(self, query: Query) -> _rrt_star.Options:
+    def options(self, query: Query) -> _rrt_star.RRTStarOptions:
         """Return what the loop needs, with lengths resolved for a query."""
-        return _rrt_star.Options(
+        return _rrt_star.RRTStarOptions(
             step=step_length(self.step, query, DEFAULT_STEP),
             goal_bias=0.0,
             gamma=self.gamma or proven_gamma(query),
@@ -93,7 +94,7 @@ class RRTStar(StarPlanner):
         0.05, "probability of drawing the goal until there is a path", low=0, high=1
     )
 
-    def options(self, query: Query) -> _rrt_star.Options:
+    def options(self, query: Query) -> _rrt_star.RRTStarOptions:
         """See `StarPlanner.options`."""
         return StarPlanner.options(self, query)._replace(goal_bias=self.goal_bias)
 
@@ -115,8 +116,8 @@ def proven_gamma(query: Query) -> float:
 
 
 def loop_of(
-    options: _rrt_star.Options, roots: np.ndarray, problem: Problem, stop: Stop
-) -> Kernel[_rrt_star.Star]:
+    options: _rrt_star.RRTStarOptions, roots: np.ndarray, problem: Problem, stop: Stop
+) -> Kernel[_rrt_star.RRTStarState]:
     """Make the loop for one tree or two, by their roots, shape (trees, dof)."""
     forest = rooted_forest(roots, len(roots) + 1 + len(roots) * (stop.iterations + 1))
     n = len(forest.parent)
@@ -127,7 +128,7 @@ def loop_of(
         far = float(problem.robot.distance(problem.start, problem.goal))
         counts[_rrt_star.GOAL_NEAR] = 0 < far <= options.step
         counts[_rrt_star.GOAL_NODE] = -int(far > 0)
-    star = _rrt_star.Star(
+    state = _rrt_star.RRTStarState(
         forest=forest,
         edge=np.zeros(n),
         child=np.empty(n, np.int32),
@@ -143,16 +144,16 @@ def loop_of(
         best=np.array([np.inf, np.inf]),
         scratch=np.array([problem.start, problem.start, problem.goal, problem.start]),
     )
-    star.child[: len(roots)] = -1
-    star.sibling[: len(roots)] = -1
-    star.linked[: len(roots)] = -1
-    return Kernel(_rrt_star.advance, star, options, _grown, 8, stop.iterations)
+    state.child[: len(roots)] = -1
+    state.sibling[: len(roots)] = -1
+    state.linked[: len(roots)] = -1
+    return Kernel(_rrt_star.advance, state, options, _enlarged, 8, stop.iterations)
 
 
-def _grown(star: _rrt_star.Star) -> _rrt_star.Star:
-    n, forest = int(star.forest.nodes[0]), grown_forest(star.forest)
+def _enlarged(state: _rrt_star.RRTStarState) -> _rrt_star.RRTStarState:
+    n, forest = int(state.forest.nodes[0]), enlarged_forest(state.forest)
     names = ["edge", "child", "sibling", "near", "far", "known", "stack"]
     # There are no more links than nodes.
-    names += ["links", "link_far", "linked"] if len(star.links) else []
-    larger = {name: grown(getattr(star, name), n, len(forest.parent)) for name in names}
-    return star._replace(forest=forest, **larger)
+    names += ["links", "link_far", "linked"] if len(state.links) else []
+    larger = {name: enlarged(getattr(state, name), n, len(forest.parent)) for name in names}
+    return state._replace(forest=forest, **larger)

@@ -13,7 +13,7 @@ import numpy as np
 from brrt.comparison.events import first_difference
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.planners import PLANNERS, make_planner
 from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelPlanner, KernelRun
 from brrt.planners.base.problem import Problem

@@ -12,7 +12,7 @@ import numpy as np
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.planners import PLANNERS, check_params, make_planner, make_stop, state_contract
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop

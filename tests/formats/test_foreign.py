@@ -11,7 +11,7 @@ import pytest
 
 from brrt import RRT, BrrtError, Kind, McapSink, Memory, Metrics, Run, Scenario, check, forest, read
 from brrt.events import Events, Phase, Stage, Status, table_dtype
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.views.rerun.sink import RerunSink
 from tests.conftest import Result, recorded, result_of
 from tests.support.toys import TOYS, Silent

@@ -218,7 +218,7 @@ def test_slow_planners_hand_over_what_they_have(
     )
     _, log = recorded(scenario)
     clock = iter(range(10**9))
-    monkeypatch.setattr("brrt.kernels.emit._PATIENCE_S", -1.0)
+    monkeypatch.setattr("brrt.kernels.event_log._MAX_DELAY_S", -1.0)
     monkeypatch.setattr("brrt.planners.base.stop.time.monotonic", lambda: float(next(clock)))
     run, memory = Run(scenario), Memory()
     run.stop._share = 1

@@ -15,7 +15,7 @@ from brrt.kernels.jit import config, kernel
 from brrt.kernels.kdtree import (
     BUCKET,
     KdTree,
-    grown_kdtree,
+    enlarged_kdtree,
     has_room,
     insert,
     near,
@@ -73,7 +73,7 @@ def planted(points: Floats, capacity: int = 4) -> KdTree:
         done = insert_some(tree, space, points, done)
         if done < len(points):
             capacity *= 2
-            tree = grown_kdtree(tree, capacity)
+            tree = enlarged_kdtree(tree, capacity)
     return tree
 
 
@@ -143,7 +143,7 @@ def test_while_growing(dim: int) -> None:
     tree = rooted_kdtree(points[:1], 1)
     for n in range(1, len(points)):
         while insert_some(tree, space, points[: n + 1], n) == n:
-            tree = grown_kdtree(tree, 2 * n)
+            tree = enlarged_kdtree(tree, 2 * n)
         check(tree, points[: n + 1], rng.random((3, dim)))
         check(tree, points[: n + 1], points[n : n + 1])
 
@@ -207,7 +207,7 @@ def test_growth_keeps_the_answers(dim: int) -> None:
     often, never = planted(points, 1), planted(points, 100_000)
     before = found(often, queries)
     assert (before == found(never, queries)).all()
-    assert (before == found(grown_kdtree(often, 50_000), queries)).all()
+    assert (before == found(enlarged_kdtree(often, 50_000), queries)).all()
 
 
 @pytest.mark.parametrize("capacity", [4, 100_000])
@@ -264,7 +264,7 @@ def planted_each(points: Floats, roots: NDArray[np.int64], capacity: int = 4) ->
         done = insert_each(tree, space_of(points.shape[1]), points, roots, done)
         if done < len(points):
             capacity = 2 * max(capacity, trees)
-            tree = grown_kdtree(tree, capacity)
+            tree = enlarged_kdtree(tree, capacity)
     return tree
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.events import FIELDS, Events, Kind, Reason, Stage, Status
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.kernels.jit import config, kernel
 from brrt.kernels.space import segment_free
 from brrt.planners import AStar, LRTAStar, Planner

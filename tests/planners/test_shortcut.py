@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.kernels.spaces import make_space
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing.shortcut import Shortcut

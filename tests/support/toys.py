@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brrt import Events, Kind, Problem
 from brrt.events import Phase, Reason, Source, Stage, Status
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.planners.base.stop import Stop
 from brrt.scenario.contract import Contract, Lattice, Near
 from tests.support import naive

@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from brrt.events import Events
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario.contract import Contract

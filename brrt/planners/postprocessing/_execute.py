@@ -1,4 +1,4 @@
-"""The compiled loop of the real-time mode."""
+"""The compiled loop of the execution in moves."""
 
 import math
 from typing import Any
@@ -6,22 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind
-from brrt.kernels.emit import Buffer, emit, room
+from brrt.kernels.emit import Buffer, emit_move, room
 from brrt.kernels.jit import kernel
 from brrt.kernels.space import distance, interpolate
 
 Floats = NDArray[np.float64]
 
-MOVE = int(Kind.MOVE)
-
 MOTION, PART, STEP, PLACES = range(4)
-"""Places in `place`: the motion of the path, moves of it that are made, and moves in all; and how
-many places there are."""
+"""Places in `place`: the motion of the path, the moves of it that are made, and all moves; and the
+number of places."""
 
 
 @kernel
-def walk(
+def follow(
     path: Floats,
     place: NDArray[np.int64],
     cost: Floats,
@@ -31,13 +28,13 @@ def walk(
     iteration: int,
     max_move: float,
 ) -> bool:
-    """Make moves until the end of the path or the log is full; return whether it is the end.
+    """Make moves until the end of the path or until the log is full; return whether at the end.
 
     Args:
         path: Waypoints, shape (n, dof).
-        place: How far the robot has come, shape (PLACES,).
+        place: Progress of the robot, see above, shape (PLACES,).
         cost: Length of the moves so far, shape (1,).
-        q: Where a move leads, shape (1, dof).
+        q: End of a move, shape (1, dof).
         space: Configuration space.
         log: Events.
         iteration: The planner's count, for the events.
@@ -46,7 +43,7 @@ def walk(
     while place[MOTION] < len(path) - 1:
         i = place[MOTION]
         far = distance(space, path, i, path, i + 1)
-        # Cutting rounds; a move must not become longer than allowed by that.
+        # A motion as long as a number of moves must not take one more because of rounding.
         moves = max(1, math.ceil(far / max_move * (1.0 - 1e-12)))
         while place[PART] < moves:
             if room(log) < 1:
@@ -58,7 +55,7 @@ def walk(
             if place[PART] < moves:
                 interpolate(space, path, i, path, i + 1, place[PART] / moves, q, 0)
             cost[0] += far / moves
-            emit(log, MOVE, iteration, 0, place[STEP], -1, cost[0], q, 0)
+            emit_move(log, iteration, 0, place[STEP], -1, cost[0], q, 0)
         place[MOTION] += 1
         place[PART] = 0
     return True

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Status
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing import _execute
 from brrt.settings import Settings, param
@@ -46,7 +46,7 @@ class Execute(Settings):
         )
         while not stop.interrupted:
             log.tick()
-            if _execute.walk(path, place, cost, q, space, log.buffer, iteration, self.max_move):
+            if _execute.follow(path, place, cost, q, space, log.buffer, iteration, self.max_move):
                 break
             yield log.drain()
         if log.room < 1:

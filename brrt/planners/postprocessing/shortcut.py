@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status
-from brrt.kernels.emit import EventLog
+from brrt.kernels.event_log import EventLog
 from brrt.kernels.random import borrow, give_back
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing import _shortcut
