@@ -1,6 +1,5 @@
 """What an event can say: told of what a planner emits, and of what a file is read to hold."""
 
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -67,9 +66,5 @@ def _beyond(values: NDArray[Any], least: float, most: float) -> NDArray[np.bool_
 def _impossible(kind: Kind, name: str, event: np.void) -> BrrtError:
     value = " ".join(str(event[name]).split())[:60]
     choices = next((f.choices for f in FIELDS[kind] if f.name == name and f.choices), ())
-    there = f"; there is {', '.join(map(_told, choices))}" if choices else ""
+    there = f"; there is {', '.join(f'{c.value} ({c.label})' for c in choices)}" if choices else ""
     return BrrtError(f"event {event['seq']:,}: {kind.label} has {name} = {value}{there}")
-
-
-def _told(choice: IntEnum) -> str:
-    return f"{choice.value} ({choice.name.lower().replace('_', ' ')})"

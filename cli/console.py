@@ -146,14 +146,11 @@ def _outcome(f: Mapping[str, Any]) -> str:
 
 def _counts(f: Mapping[str, Any]) -> Iterator[str]:
     """What a run consists of, as far as there is any of it."""
-    for name, one, several in (
-        ("samples", "sample", None), ("nodes", "node", None),
-        ("expanded", "cell expanded", "cells expanded"),
-        ("learned", "estimate raised", "estimates raised"), ("rejects", "rejected", "rejected"),
-        ("rewires", "rewired", "rewired"), ("links", "link", None),
-    ):  # fmt: skip
-        if f[name]:
-            yield counted(f[name], one, several)
+    from brrt.events import COUNTS, Kind  # noqa: PLC0415 - keep --help fast
+
+    for kind, count in COUNTS.items():
+        if count.key and f[count.key] and kind is not Kind.SHORTCUT:  # smoothing has its own line
+            yield count.text(f[count.key])
 
 
 def counted(number: int, one: str, several: str | None = None) -> str:

@@ -8,17 +8,10 @@ from brrt.comparison.events import Deviation, first_difference
 from brrt.comparison.report import Comparison, Cut
 from brrt.comparison.settings import metadata_of, settings_of
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import Events, Kind
+from brrt.events import COUNTS, Events, Kind
 from brrt.formats import read
 from brrt.recording import Recording
 from brrt.replay.metrics import Metrics
-
-_COUNTED = {
-    "samples": Kind.SAMPLE, "rejects": Kind.REJECT, "edges": Kind.EDGE, "rewires": Kind.REWIRE,
-    "links": Kind.CONNECT, "expanded": Kind.EXPAND, "learned": Kind.HEURISTIC,
-    "shortcuts": Kind.SHORTCUT,
-}  # fmt: skip
-"""Metrics that count the events of a kind."""
 
 _NEEDED = ("solved", "status", "iterations", "events")
 """Metrics without which a recording's result is not used."""
@@ -116,4 +109,4 @@ class _Log:
         if counts is not None:
             return {kind.label: counts.get(kind, 0) for kind in Kind}
         result = self._recording.result or {}
-        return {kind.label: result[name] for name, kind in _COUNTED.items() if name in result}
+        return {k.label: result[c.key] for k, c in COUNTS.items() if c.key and c.key in result}

@@ -194,7 +194,7 @@ def event_at(events: Events, seq: int) -> dict[str, Any] | None:
         if at < len(table) and table["seq"][at] == seq:
             row = table[at]
             named = {
-                f.name: f.choices(int(row[f.name])).name.lower() if f.choices else row[f.name]
+                f.name: f.choices(int(row[f.name])).key if f.choices else row[f.name]
                 for f in FIELDS[kind]
             }
             return {"kind": kind.label, "iteration": int(row["iteration"]), **named}

@@ -11,7 +11,6 @@ from brrt.explanation.clearance import Narrow, Way, Ways
 from brrt.explanation.gather import FAILED, Gather
 from brrt.explanation.places import Blocker, Coverage, Gap, Places, Spot
 from brrt.replay.snapshot import Snapshot
-from brrt.replay.transcript import choice_name
 from brrt.robots import Robot
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contract_of
@@ -213,7 +212,7 @@ def facts(moment: Snapshot, file: str, robot: Robot, gather: Gather) -> Facts:
         trees=gather.trees,
         accepted=int(gather.spans.sums[:, 0].sum()),
         failed=int(gather.spans.sums[:, 1].sum()),
-        reasons={choice_name(Reason, reason): n for reason, n in gather.reasons.most_common()},
+        reasons={Reason.label_of(reason): n for reason, n in gather.reasons.most_common()},
         blockers=places.blockers(*ends),
         spot=places.spot(*ends),
         goals=_goals(gather, places),

@@ -9,7 +9,6 @@ import numpy as np
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Table
 from brrt.replay.node_history import When
-from brrt.replay.transcript import choice_name
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
 
@@ -100,7 +99,7 @@ class CellTrace:
             self._seen = max(self._seen, int(table["cell"].max(initial=-1)))
         rejects = events[Kind.REJECT]
         for reason in rejects["reason"][rejects["node"] == self._cell].tolist():
-            self._reasons[choice_name(Reason, reason)] += 1
+            self._reasons[Reason.label_of(reason)] += 1
 
     @property
     def has_cells(self) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.events import Events, Instant, Kind, Phase, Stage, Status, Table
+from brrt.events import COUNTS, Events, Instant, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.fold import feed
 from brrt.scenario.manifest import Manifest
@@ -103,7 +103,7 @@ class Metrics:
     def status(self) -> str:
         """How planning ended; "running" if the log ends before."""
         ended = self._ended.get(Phase.PLAN)
-        return "running" if ended is None else ended[1].name.lower().replace("_", " ")
+        return "running" if ended is None else ended[1].label
 
     @property
     def cut(self) -> bool:
@@ -136,15 +136,8 @@ class Metrics:
             "status": self.status,
             "iterations": self._iterations,
             "events": self._events,
-            "samples": self._counts[Kind.SAMPLE],
-            "rejects": self._counts[Kind.REJECT],
             "nodes": self._counts[Kind.EDGE],
-            "edges": self._counts[Kind.EDGE],
-            "rewires": self._counts[Kind.REWIRE],
-            "links": self._counts[Kind.CONNECT],
-            "expanded": self._counts[Kind.EXPAND],
-            "learned": self._counts[Kind.HEURISTIC],
-            "shortcuts": self._counts[Kind.SHORTCUT],
+            **{count.key: self._counts[kind] for kind, count in COUNTS.items() if count.key},
             "path_cost": _finite(raw and raw[0]),
             "path": None if raw is None else raw[1].tolist(),
             "smoothed_cost": _finite(smoothed and smoothed[0]),

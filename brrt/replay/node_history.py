@@ -11,7 +11,6 @@ from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Source, Stage, Table
 from brrt.replay.cost_history import CostHistory
 from brrt.replay.forest import Tree, forest
-from brrt.replay.transcript import choice_name
 from brrt.replay.tree_fold import TreeChanges
 from brrt.robots import Robot
 from brrt.verification.collision.motions import Obstacles, first_hits
@@ -244,7 +243,7 @@ class NodeTrace:
         if row is None:
             return None
         number = int(row["source"])
-        return Draw(When.of(row), int(row["tree"]), choice_name(Source, number), row["q"].tolist())
+        return Draw(When.of(row), int(row["tree"]), Source.label_of(number), row["q"].tolist())
 
     def _cost_changes(self, events: Events, tree: Tree, robot: Robot) -> list[CostChange]:
         """Return the node's own rewires, and those of ancestors that changed its cost."""
@@ -288,7 +287,7 @@ class NodeTrace:
         return [
             Rejection(
                 When.of(row),
-                choice_name(Reason, int(row["reason"])),
+                Reason.label_of(int(row["reason"])),
                 row["q"].tolist(),
                 names.get(i),
             )

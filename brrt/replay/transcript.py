@@ -3,14 +3,13 @@
 Times, versions and folders are left out, and numbers are rounded to six digits.
 """
 
-from collections.abc import Iterator, Mapping
-from enum import IntEnum
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
+from brrt.events import COUNTS, FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.fold import feed
 from brrt.robots import Robot
@@ -22,19 +21,6 @@ Line = tuple[int, str]
 
 _LEAST_GAIN = 0.01
 """How much better a path must be than the last one printed; there may be thousands."""
-
-_COUNTED: Mapping[Kind, tuple[str, str | None]] = {
-    Kind.SAMPLE: ("samples", "source"),
-    Kind.EDGE: ("nodes", "tree"),
-    Kind.REJECT: ("rejected", "reason"),
-    Kind.REWIRE: ("rewired", None),
-    Kind.CONNECT: ("links", None),
-    Kind.EXPAND: ("cells expanded", None),
-    Kind.HEURISTIC: ("estimates raised", None),
-    Kind.SHORTCUT: ("shortcuts", "accepted"),
-    Kind.MOVE: ("moves", None),
-}
-"""What the events of a phase are called, and the field by which they are divided."""
 
 
 class Transcript:
@@ -96,7 +82,7 @@ class Transcript:
 
     def _count(self, events: Events, first: int, end: int) -> None:
         """Count the events with numbers from `first` to `end`."""
-        for kind, (_, choice) in _COUNTED.items():
+        for kind, (*_, choice) in COUNTS.items():
             table = events[kind]
             part = table[np.searchsorted(table["seq"], first) : np.searchsorted(table["seq"], end)]
             if not len(part):
@@ -122,14 +108,13 @@ class Transcript:
         phase, status = Phase(int(event["name"])), Status(int(event["status"]))
         iteration = int(event["iteration"])
         if status is Status.BEGIN:
-            self._lines.append((iteration, f"{phase.name.lower()} begins"))
+            self._lines.append((iteration, f"{phase.label} begins"))
             return
         self._lines += self._newest()
         self._lines += [(iteration, text) for _, text in self._counted()]
         self._counts.clear()
         self._skipped = None
-        how = status.name.lower().replace("_", " ")
-        self._lines.append((iteration, f"{phase.name.lower()} ends: {how}"))
+        self._lines.append((iteration, f"{phase.label} ends: {status.label}"))
         if phase is Phase.PLAN and self._path is None:
             self._lines += [(iteration, text) for text in self._failure()]
 
@@ -145,7 +130,7 @@ class Transcript:
     def _add_path(self, event: Any) -> None:
         stage, cost = Stage(int(event["stage"])), float(event["cost"])
         waypoints = len(event["waypoints"])
-        name = "first path" if self._path is None else f"{stage.name.lower()} path"
+        name = "first path" if self._path is None else f"{stage.label} path"
         text = f"{name}: cost {cost:.6g}, {waypoints} waypoints"
         if self._path is not None and self._path > 0:
             text += f", {100 * (1 - cost / self._path):.2f} % less than the first"
@@ -163,13 +148,11 @@ class Transcript:
 
     def _counted(self) -> Iterator[Line]:
         """Yield the counts since the phase began."""
-        for kind, (word, choice) in _COUNTED.items():
+        for kind, counted in COUNTS.items():
             found = {value: n for (k, value), n in sorted(self._counts.items()) if k is kind}
             if not found:
                 continue
-            total = sum(found.values())
-            text = f"{total:,} {word.removesuffix('s') if total == 1 else word}"
-            named = _named(kind, choice, found)
+            text, named = counted.text(sum(found.values())), _named(kind, counted.by, found)
             yield self._iteration, f"{text}: {named}" if named else text
 
 
@@ -182,13 +165,8 @@ def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
     if choice == "tree":
         return ", ".join(f"{n:,} in tree {tree}" for tree, n in found.items())
     choices = next(field.choices for field in FIELDS[kind] if field.name == choice)
-    return ", ".join(f"{n:,} {choice_name(choices, value)}" for value, n in found.items())
-
-
-def choice_name(choices: type[IntEnum] | None, value: int) -> str:
-    """Name a choice in words; a number that is none of the choices is kept."""
-    known = choices is not None and value in set(choices)
-    return choices(value).name.lower().replace("_", " ") if known and choices else str(value)
+    label: Callable[[int], str] = choices.label_of if choices else str
+    return ", ".join(f"{n:,} {label(value)}" for value, n in found.items())
 
 
 def _last_name(spec: str) -> str:

@@ -146,7 +146,7 @@ def test_a_seek_shows_the_paths(name: str, shown: Callable[[str], Shown]) -> Non
     for t in [*times(log), *log[Kind.PATH]["t"].tolist()]:
         for stage in Stage:
             past = [row for row in log[Kind.PATH] if row["t"] <= t and row["stage"] == stage]
-            drawn = segments(export.at(t, f"/viz/path/{stage.name.lower()}"))
+            drawn = segments(export.at(t, f"/viz/path/{stage.key}"))
             places = robot.places(past[-1]["waypoints"]) if past else np.empty((0, 2))
             want = lines(places[:-1], places[1:])
             assert [end[:2] for pair in drawn for end in pair] == [

@@ -91,7 +91,7 @@ def phases(context: Context, result: RuleResult) -> None:
 
 
 def _phase(number: int) -> str:
-    return f"phase {Phase(number).name.lower() if number in set(Phase) else number}"
+    return f"phase {Phase.label_of(number)}"
 
 
 def names(context: Context, result: RuleResult) -> Windows:  # noqa: ARG001 - every rule takes both
@@ -121,7 +121,7 @@ def outcome(context: Context, result: RuleResult) -> None:
     elif (
         context.found and context.outcome is not None and context.outcome not in _with_path(context)
     ):
-        wrong = f"there is a path, but planning ended as {context.outcome.name.lower()}"
+        wrong = f"there is a path, but planning ended as {context.outcome.label}"
     result.one(event, wrong)
 
 

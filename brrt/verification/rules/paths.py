@@ -68,7 +68,7 @@ def paths_improve(context: Context, result: RuleResult) -> None:
         elif before is not None and one:
             wrong = "another path, of a planner that stops at the first"
         elif context.known and stage != due:
-            wrong = f"said to be of stage {stage}; it is {due.name.lower()}"
+            wrong = f"said to be of stage {stage}; it is {due.label}"
         result.one(event, wrong)
         before = cost
 

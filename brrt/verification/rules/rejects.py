@@ -59,7 +59,7 @@ def reasons(context: Context, result: RuleResult) -> Windows:
     costs no more, and a link leads to the other tree's newest node. Where that takes a look at the
     trees, 20,000 are looked at.
     """
-    kept, best = Thinned(table_dtype(Kind.REJECT, context.dof), MOST), np.inf
+    kept, best, name = Thinned(table_dtype(Kind.REJECT, context.dof), MOST), np.inf, Reason.label_of
     while (window := (yield)) is not None:
         table, paths = window[Kind.REJECT], window[Kind.PATH]
         paths = paths[paths["stage"] != Stage.SMOOTHED]
@@ -76,7 +76,7 @@ def reasons(context: Context, result: RuleResult) -> Windows:
         right &= (reason != Reason.GOAL_BLOCKED) | to_goal
         result.look(
             table, np.asarray(~right),
-            lambda i, r=reason, q=q: f"{_named(int(r[i]))} is no reason for {text(q[i])} to be",  # type: ignore[misc]
+            lambda i, r=reason, q=q: f"{name(int(r[i]))} is no reason for {text(q[i])} to be",  # type: ignore[misc]
         )  # fmt: skip
         kept.add(table[np.isin(reason, _SEEN_IN_TREES)])
     if context.contract.growth is not None:
@@ -125,11 +125,6 @@ def _possible(contract: Contract) -> list[int]:
     if contract.draws is not None and contract.draws.informed:
         found.append(Reason.NO_GAIN)
     return [int(reason) for reason in found]
-
-
-def _named(reason: int) -> str:
-    known = reason in set(Reason)
-    return Reason(reason).name.lower().replace("_", " ") if known else f"reason {reason}"
 
 
 def limits(context: Context, result: RuleResult) -> Windows:

@@ -112,7 +112,7 @@ def sources(context: Context, result: RuleResult) -> Windows:
         result.look(
             drawn.table, np.asarray(wrong),
             lambda i, source=source, best=drawn.best: (  # type: ignore[misc]
-                f"a draw from source {Source(source[i]).name.lower().replace('_', ' ')} "
+                f"a draw from source {Source(source[i]).label} "
                 + ("where there is no path" if np.isinf(best[i]) else "where there is a path")
             ),
         )  # fmt: skip

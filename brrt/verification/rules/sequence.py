@@ -47,7 +47,7 @@ def phase_contents(context: Context, result: RuleResult) -> Windows:
 
 
 def _within(phase: int) -> str:
-    names = {int(p): p.name.lower() for p in Phase}
+    names = {int(p): p.label for p in Phase}
     return f"within phase {names.get(phase, phase)}" if phase >= 0 else "outside of all phases"
 
 
@@ -134,12 +134,7 @@ def _act(line: np.void) -> str:
     """Say what a line of a script is."""
     kind, why = Kind(line["kind"]), int(line["why"])
     names = {Kind.REJECT: Reason, Kind.SAMPLE: Source}.get(kind)
-    known = names is not None and why in set(names)
-    return (
-        f"{kind.label} ({names(why).name.lower().replace('_', ' ')})"
-        if known and names
-        else kind.label
-    )
+    return f"{kind.label} ({names.label_of(why)})" if names else kind.label
 
 
 def _rrt_follows(lines: Table) -> Flags:

@@ -92,7 +92,7 @@ def tree_style(number: int) -> tuple[str, Colour]:
 
 def path_style(stage: Stage) -> tuple[str, Colour, float]:
     """Return a path's name, its colour, and its lines' radius in points of the screen."""
-    return (stage.name.lower(), *_PATHS.get(stage, (OTHER, 2.0)))
+    return (stage.key, *_PATHS.get(stage, (OTHER, 2.0)))
 
 
 def packed(colour: Colour) -> int:
@@ -248,8 +248,8 @@ def world_view(world: World, *, below: str = "", name: str = "World") -> Any:
     shown |= dict.fromkeys(_GROWING, past)
     shown[TAIL_ENTITY] = _last(_TAIL)
     shown |= {f"/world/rewired/{name}": just_now for name in REWIRED}
-    shown |= {f"/world/samples/{source.name.lower()}": recent for source in Source}
-    shown |= {f"/world/rejected/{reason.name.lower()}": recent for reason in Reason}
+    shown |= {f"/world/samples/{source.key}": recent for source in Source}
+    shown |= {f"/world/rejected/{reason.key}": recent for reason in Reason}
     overrides = {f"{below}{entity}": [ranges] for entity, ranges in shown.items()}
     return draw_world.world_view(world, overrides, below=below, name=name)
 

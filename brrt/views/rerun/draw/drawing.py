@@ -45,7 +45,7 @@ class Drawing:
         self._added, self._rejects = 0, dict.fromkeys(Reason, 0)
         canvas.plot_style(_ACCEPTED, "accepted", layout.NEWEST)
         for reason, colour in layout.REJECTS.items():
-            canvas.plot_style(_rejected(reason), reason.name.lower(), colour)
+            canvas.plot_style(_rejected(reason), reason.key, colour)
         self._pace = Pace(canvas)
 
     def write(self, events: Events) -> None:
@@ -94,11 +94,11 @@ def _count_until(rows: Table, table: Table) -> np.ndarray:
 
 
 def _rejected(reason: Reason) -> str:
-    return f"/series/extensions/{reason.name.lower()}"
+    return f"/series/extensions/{reason.key}"
 
 
 def _phase_text(event: np.void) -> str:
     phase, status = Phase(int(event["name"])), Status(int(event["status"]))
     if status is Status.BEGIN:
-        return f"{phase.name.lower()} begins"
-    return f"{phase.name.lower()} ends: {status.name.lower().replace('_', ' ')}"
+        return f"{phase.label} begins"
+    return f"{phase.label} ends: {status.label}"

@@ -85,7 +85,7 @@ class Paths:
 
     def _text(self, event: Any, stage: Stage) -> str:
         cost, waypoints = float(event["cost"]), len(event["waypoints"])
-        text = f"{stage.name.lower()} path: cost {cost:.6g}, {waypoints} waypoints"
+        text = f"{stage.label} path: cost {cost:.6g}, {waypoints} waypoints"
         if stage is Stage.RAW:
             self._raw_cost = cost
         elif 0 < self._raw_cost < np.inf:

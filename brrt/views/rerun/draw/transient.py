@@ -27,9 +27,9 @@ class Fading:
         self._canvas, self._sketches = canvas, sketches
         self._seen: dict[str, int] = {}
         for source, colour in layout.SAMPLES.items():
-            canvas.style(f"/world/samples/{source.name.lower()}", canvas.points, colour, -2, 30.0)
+            canvas.style(f"/world/samples/{source.key}", canvas.points, colour, -2, 30.0)
         for reason, colour in layout.REJECTS.items():
-            entity = f"/world/rejected/{reason.name.lower()}"
+            entity = f"/world/rejected/{reason.key}"
             canvas.style(entity, canvas.lines, colour, -0.5, 10.0)
         for name, colour in layout.REWIRED.items():
             canvas.style(f"/world/rewired/{name}", canvas.lines, colour, -1.25, 25.0)
@@ -38,7 +38,7 @@ class Fading:
         """Draw samples."""
         sources = np.ascontiguousarray(table["source"])
         for source in Source:
-            name = source.name.lower()
+            name = source.key
             rows = table.take(self._shown(table, sources == source, f"{name} samples"))
             if len(rows):
                 points = self._canvas.points.columns(positions=self._canvas.places(rows["q"]))
@@ -47,7 +47,7 @@ class Fading:
     def rejects(self, table: Table) -> None:
         """Draw from where to where extensions were tried in vain."""
         for reason in Reason:
-            name = reason.name.lower()
+            name = reason.key
             rows = table.take(self._shown(table, table["reason"] == reason, f"{name} rejections"))
             if len(rows):
                 self._send_lines(f"rejected/{name}", rows, self._attempts(rows))
