@@ -14,6 +14,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 from rich.text import Text
 
+from brrt.replay.text import counted, seconds
+
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
 
@@ -151,19 +153,6 @@ def _counts(f: Mapping[str, Any]) -> Iterator[str]:
     for kind, count in COUNTS.items():
         if count.key and f[count.key] and kind is not Kind.SHORTCUT:  # smoothing has its own line
             yield count.text(f[count.key])
-
-
-def counted(number: int, one: str, several: str | None = None) -> str:
-    """Write a number of things: `1 node`, `1,200 nodes`."""
-    return f"{number:,} {one if number == 1 else several or one + 's'}"
-
-
-def seconds(value: float) -> str:
-    """Write a duration in the unit that suits it."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if value >= size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value * 1e9:.0f} ns"
 
 
 class Watch:

@@ -53,5 +53,5 @@ def explain(
     print_lines(found.table())
     for i, advice in enumerate(found.advice):
         print_lines(["", *advice.reason(i + 1)])
-        for line in advice.typed():
+        for line in advice.command_lines():
             out.print(line, style="bold", markup=False, soft_wrap=True)

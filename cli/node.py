@@ -1,9 +1,11 @@
 """`brrt replay --node`: the history of a node of a tree, or of a cell of a lattice."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from .console import print_json, print_pairs, seconds
+from brrt.replay.text import counted, seconds, vector
+
+from .console import print_json, print_pairs
 
 if TYPE_CHECKING:
     from brrt.replay.cell_history import CellHistory
@@ -52,12 +54,12 @@ def show_node(moment: "Snapshot", node: int, tree: int, *, as_json: bool) -> Non
 def _of_node(h: "NodeHistory") -> Rows:
     from brrt.replay.node_history import tree_name  # noqa: PLC0415
 
-    yield "node", f"{h.node:,} of {tree_name(h.tree)} at {_place(h.q)}"
+    yield "node", f"{h.node:,} of {tree_name(h.tree)} at {vector(h.q)}"
     parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"
     yield "added", f"{_when(h.born)}; {parent}, cost {h.born_cost:.6g}"
     if h.sample is not None:
         other = "" if h.sample.tree == h.tree else f" for tree {h.sample.tree}"
-        drawn = f"{h.sample.source}{other}, {_place(h.sample.q)}"
+        drawn = f"{h.sample.source}{other}, {vector(h.sample.q)}"
         yield "sample", f"event {h.sample.when.event:,}: {drawn}"
     yield from _listed(
         "rewired",
@@ -79,8 +81,8 @@ def _of_node(h: "NodeHistory") -> Rows:
         yield "now", f"child of {h.parent:,}, cost {h.cost:.6g}"
     yield (
         "subtree",
-        f"{_count(len(h.children), 'child', 'children')}{_some(h.children)}, "
-        + _count(h.descendants, "descendant"),
+        f"{counted(len(h.children), 'child', 'children')}{_some(h.children)}, "
+        + counted(h.descendants, "descendant"),
     )
     yield "from root", _lineage(h.lineage)
     on = [f"waypoint {i} of the {stage} path" for stage, i in h.paths.items()]
@@ -92,12 +94,12 @@ def _rejects(h: "NodeHistory") -> Rows:
     if not h.rejects:
         yield "rejected", "no extensions from this node"
         return
-    extensions = _count(len(h.rejects), "extension")
+    extensions = counted(len(h.rejects), "extension")
     yield "rejected", f"{extensions} from this node: {_counts(h.reasons())}"
     if h.hits():
         yield "", f"obstacles: {_counts(h.hits())}"
     lines = [
-        f"{_when(each.when)}; {each.reason} towards {_place(each.q)}"
+        f"{_when(each.when)}; {each.reason} towards {vector(each.q)}"
         + (f", {each.hit}" if each.hit else "")
         for each in h.rejects
     ]
@@ -105,8 +107,8 @@ def _rejects(h: "NodeHistory") -> Rows:
 
 
 def _of_cell(h: "CellHistory") -> Rows:
-    yield "cell", f"{h.cell:,} at {_place(h.q)}, {h.distance:.6g} from the goal"
-    times = _count(len(h.looks), "time")
+    yield "cell", f"{h.cell:,} at {vector(h.q)}, {h.distance:.6g} from the goal"
+    times = counted(len(h.looks), "time")
     yield "expanded", times
     yield from _listed(
         "",
@@ -117,7 +119,7 @@ def _of_cell(h: "CellHistory") -> Rows:
             for look in h.looks
         ],
     )
-    yield "estimate", f"{h.estimate:.6g}, raised {_count(len(h.lessons), 'time')}"
+    yield "estimate", f"{h.estimate:.6g}, raised {counted(len(h.lessons), 'time')}"
     yield from _listed(
         "",
         [
@@ -125,7 +127,7 @@ def _of_cell(h: "CellHistory") -> Rows:
             for lesson in h.lessons
         ],
     )
-    yield "entered", _count(len(h.visits), "time")
+    yield "entered", counted(len(h.visits), "time")
     yield from _listed("", [_when(visit) for visit in h.visits])
     if h.rejects:
         yield "rejected", f"motions from this cell: {_counts(h.rejects)}"
@@ -143,14 +145,6 @@ def _listed(name: str, lines: list[str]) -> Rows:
 
 def _when(when: "When") -> str:
     return f"event {when.event:,}, iteration {when.iteration:,}, {seconds(when.time_s)}"
-
-
-def _place(q: Iterable[float]) -> str:
-    return "(" + ", ".join(f"{x:.6g}" for x in q) + ")"
-
-
-def _count(n: int, one: str, many: str | None = None) -> str:
-    return f"{n:,} {one if n == 1 else many or one + 's'}"
 
 
 def _some(numbers: list[int]) -> str:
@@ -173,4 +167,4 @@ def _lineage(lineage: list[int]) -> str:
     texts = [f"{node:,}" for node in ends]
     if len(ends) < len(lineage):
         texts.insert(_SHOWN, f"... {len(lineage) - len(ends):,} more ...")
-    return f"{_count(len(lineage) - 1, 'edge')}: {' - '.join(texts)}"
+    return f"{counted(len(lineage) - 1, 'edge')}: {' - '.join(texts)}"

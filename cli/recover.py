@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-from .console import Code, counted, out
+from brrt.replay.text import counted
+
+from .console import Code, out
 
 
 def recover(

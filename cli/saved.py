@@ -7,7 +7,9 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .console import counted, note
+from brrt.replay.text import counted
+
+from .console import note
 
 if TYPE_CHECKING:
     from brrt.events import Events

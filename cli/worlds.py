@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from .console import Watch, counted, note, out, print_json, print_pairs, print_rows
+from brrt.replay.text import counted
+
+from .console import Watch, note, out, print_json, print_pairs, print_rows
 from .lists import Json, chosen, described, print_described
 
 if TYPE_CHECKING:

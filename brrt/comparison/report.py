@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from brrt.comparison.difference import WIDTH, Difference, brief_pair, clipped
 from brrt.comparison.settings import Row
+from brrt.replay.text import seconds
 
 METRICS = (
     "path_cost", "smoothed_cost", "first_path_cost", "first_path_iteration", "iterations",
@@ -221,12 +222,7 @@ def _row(name: str, a: str, b: str, change: str = "") -> str:
 
 
 def _seconds(value: float | None) -> str:
-    if value is None:
-        return "none"
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if value >= size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value * 1e6:.3g} us"
+    return "none" if value is None else seconds(value)
 
 
 def _count(value: int | None) -> str:

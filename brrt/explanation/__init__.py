@@ -1,4 +1,4 @@
-"""Why a run failed, or took long: figures computed from its recording, and what they suggest."""
+"""Why a run failed or took long: facts computed from its recording, and advice that follows."""
 
 from dataclasses import dataclass
 from os import PathLike
@@ -8,7 +8,6 @@ from brrt.errors import BrrtError
 from brrt.explanation.advice import advise
 from brrt.explanation.commands import Advice
 from brrt.explanation.facts import Facts, facts
-from brrt.explanation.gather import Gather
 from brrt.explanation.report import Row, rows, table
 from brrt.recording import Recording
 from brrt.replay.snapshot import Snapshot
@@ -16,33 +15,33 @@ from brrt.replay.snapshot import Snapshot
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What a run was like, and what to try; as text it is what `brrt explain` prints.
+    """The facts of a run and advice; as text it is what `brrt explain` prints.
 
     Attributes:
-        facts: Figures.
-        advice: What follows from them, the most telling first.
+        facts: The facts.
+        advice: What to try, the most promising first.
     """
 
     facts: Facts
     advice: list[Advice]
 
     def rows(self) -> list[Row]:
-        """Tell the facts in words: names with what there is to say."""
+        """Return the facts in words: names and texts."""
         return list(rows(self.facts))
 
     def table(self) -> list[str]:
-        """Write the facts for a screen of 80 columns, in lines."""
+        """Return the facts as lines of 80 columns."""
         return list(table(self.rows()))
 
     def __str__(self) -> str:
         """Return what `brrt explain` prints."""
         lines = self.table()
         for i, advice in enumerate(self.advice):
-            lines += ["", *advice.reason(i + 1), *advice.typed()]
+            lines += ["", *advice.reason(i + 1), *advice.command_lines()]
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain numbers, texts, lists and dicts."""
+        """Return plain numbers, texts, lists and dicts."""
         return {**self.facts.as_dict(), "advice": [each.as_dict() for each in self.advice]}
 
 
@@ -62,11 +61,8 @@ def explain(run: Recording | Snapshot, file: str = "") -> Explanation:
         )
     if not isinstance(run, Recording | Snapshot):
         raise BrrtError(f"explain takes a recording or a snapshot of one, not {run!r:.60}")
-    moment = run if isinstance(run, Snapshot) else Snapshot(run)
-    robot = moment.recording.robot()
-    gather = Gather(moment.recording.manifest, robot)
-    moment.feed(gather)
-    found = facts(moment, file or moment.recording.name, robot, gather)
+    snapshot = run if isinstance(run, Snapshot) else Snapshot(run)
+    found = facts(snapshot, file or snapshot.recording.name)
     return Explanation(found, advise(found))
 
 

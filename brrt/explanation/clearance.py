@@ -1,4 +1,4 @@
-"""The way from start to goal: whether there is one, how narrow it is, what a run did about it."""
+"""How wide the widest path from start to goal is, and whether the run got through."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.explanation.gather import Gather
 from brrt.explanation.places import coarse
+from brrt.explanation.summary import RunSummary
 from brrt.robots import Polygon, Robot
 from brrt.worlds.convex import inscribed
 from brrt.worlds.free_space import connected
@@ -17,25 +17,25 @@ from brrt.worlds.world import World
 Floats = NDArray[np.float64]
 
 _PROOF = (1 << 16, 1 << 18)
-"""Cells of the lattices by which the width of any way is bounded."""
+"""Cells of the lattices that bound the width of every path, tried in this order."""
 
 _ALONG = 2000
-"""Configurations on a path that are held against a narrow place."""
+"""Configurations on a path that are compared with a narrow place."""
 
 
 @dataclass(frozen=True, slots=True)
 class Narrow:
-    """The narrowest place on the widest way from start to goal; see `brrt.worlds.narrow_passage`.
+    """The narrowest place on the widest path; see `brrt.worlds.narrow_passage`.
 
     Attributes:
         low: Least width of it.
         high: Greatest width of it.
-        q: Where it is.
-        parts: Whether it parts start and goal; else one of these is where there is least room.
-        behind: Nodes that are behind it, seen from the start.
-        through: Iteration in which the first of them joined; None without one.
+        q: Its position.
+        parts: Whether it separates start and goal; otherwise it is next to one of them.
+        behind: Nodes beyond it, as seen from the start.
+        through: Iteration in which the first of them was added; None without one.
         near: Nodes of any tree, or cells, within `reach` of it.
-        reach: A step, or the side of a coarse cell where that is longer.
+        reach: A step, or the side of a coarse cell if that is longer.
         crossed: Whether the run's path leads through it; None without a path.
     """
 
@@ -51,17 +51,17 @@ class Narrow:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
-    """What is known of the way from start to goal.
+class Clearance:
+    """What is known of the paths from start to goal.
 
     Attributes:
-        connected: Whether there is one, for a point or a point of the body: both are proven.
-        reason: On what that rests.
-        narrow: The narrowest place on the widest one; None where no cells showed one.
-        widest: No way is wider than this, which is proven: 0 where there is none; None where it
-            was not asked for, or no such bound was found.
-        body: The body is at least that wide in every direction: a disc of it fits inside; 0 for a
-            point, and where nobody knows.
+        connected: Whether there is a path for a point of the body; True and False are proven.
+        reason: Why that is known, or why it is not.
+        narrow: The narrowest place on the widest path; None if no path of cells was found.
+        widest: Proven upper bound on the width of every path, 0 if there is none; None if it was
+            not needed or not found.
+        body: Diameter of a disc inside the body, so that no narrower path lets it through; 0 for
+            robots other than polygons.
     """
 
     connected: bool | None
@@ -72,60 +72,59 @@ class Way:
 
     @property
     def too_narrow(self) -> bool:
-        """Whether the body is proven to be too wide for any way."""
+        """Whether every path is proven to be too narrow for the body."""
         return self.widest is not None and self.widest < self.body
 
 
-class Ways:
-    """What there is to say of the way.
+class ClearanceSearch:
+    """Searches for the widest path from start to goal.
 
     Args:
-        world: The run's.
-        robot: What moves, settled in it.
-        gather: What the log says.
+        world: The world.
+        robot: The robot, resolved in it.
+        summary: The run's log, summed up.
     """
 
-    def __init__(self, world: World, robot: Robot, gather: Gather) -> None:
-        self._world, self._robot, self._gather = world, robot, gather
-        # A place of a body may lie outside of it; the middle of a disc within does not.
+    def __init__(self, world: World, robot: Robot, summary: RunSummary) -> None:
+        self._world, self._robot, self._summary = world, robot, summary
+        # The reference point of a body may lie outside of it; the middle of a disc inside does not.
         parts = robot.parts if isinstance(robot, Polygon) else ()
         discs = [inscribed(part) for part in parts]
         none: tuple[Floats | None, float] = None, 0.0
         self._middle, radius = max(discs, key=lambda disc: disc[1], default=none)
         self._body = 2 * radius
 
-    def find(self, start: Floats, goal: Floats, step: float | None) -> Way:
-        """Say whether there is a way, for a point or one of the body, and how narrow it is.
+    def find(self, start: Floats, goal: Floats, step: float | None) -> Clearance:
+        """Return whether there is a path for a point of the body, and how wide the widest is.
 
         Args:
-            start: First configuration, shape (dof,).
-            goal: Last configuration.
-            step: The planner's; None where it has none.
+            start: The start, shape (dof,).
+            goal: The goal, shape (dof,).
+            step: The planner's step; None if it has none.
         """
         if self._robot.configuration(self._world.lower) is None:
-            return Way(None, "not looked for: this robot has no place of its own in the world")
+            return Clearance(None, "not computed: this robot has no position in the world")
         ends = self._points(np.stack([start, goal]))
         found = narrowest(self._world, *ends)
         if found is not None:
             narrow = self._narrow(found, step)
             bound = self._widest(ends) if found.low < self._body else None
             reason = f"free cells of {found.cell:.3g} lead to the goal"
-            return Way(True, reason, narrow, bound, self._body)
+            return Clearance(True, reason, narrow, bound, self._body)
         known = connected(self._world, *ends)
         if known.connected is not None:
-            return Way(known.connected, known.reason, body=self._body)
+            return Clearance(known.connected, known.reason, body=self._body)
         bound = self._widest(ends)
         if bound == 0:
-            return Way(
-                False, "a closed wall of obstacles stands between them", None, 0.0, self._body
-            )
-        reason = f"cells of {known.cell:.3g} are too coarse to show one"
+            reason = "obstacles without a gap separate start and goal"
+            return Clearance(False, reason, None, 0.0, self._body)
+        reason = f"cells of {known.cell:.3g} are too coarse to find a path"
         if bound is not None:
-            reason += f"; it is at most {at_most(bound)} wide"
-        return Way(None, reason, None, bound, self._body)
+            reason += f"; every path is at most {at_most(bound)} wide"
+        return Clearance(None, reason, None, bound, self._body)
 
     def _widest(self, ends: Floats) -> float | None:
-        """Bound the width of any way by cells, the fewer first."""
+        """Return an upper bound on the width of every path."""
         best = np.inf
         for cells in _PROOF:
             side = self._world.extent / cells ** (1 / self._world.dim)
@@ -136,7 +135,7 @@ class Ways:
         return best if np.isfinite(best) else None
 
     def _points(self, q: Floats) -> Floats:
-        """Where a point of the body is at configurations, shape (n, dof)."""
+        """Return where a point inside the body is at configurations of shape (n, dof)."""
         places = self._robot.places(q)
         if self._middle is None:
             return places
@@ -145,24 +144,32 @@ class Ways:
         return np.asarray(places + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1))
 
     def _narrow(self, found: Passage, step: float | None) -> Narrow:
-        """Say what the run did about the narrowest place."""
-        gather, behind, through, parts = self._gather, 0, None, bool(found.behind.any())
-        for tree in gather.trees[:1]:
-            passed = found.passed(self._points(gather.nodes(tree)))
+        """Compare the run with the narrowest place."""
+        summary, behind, through = self._summary, 0, None
+        for tree in summary.trees[:1]:
+            passed = found.passed(self._points(summary.nodes(tree)))
             behind = int(passed.sum())
-            through = int(gather.iterations(tree)[passed][0]) if behind else None
-        q = [gather.nodes(tree) for tree in gather.trees] or [gather.cells.q]
-        if not gather.trees:
+            through = int(summary.iterations(tree)[passed][0]) if behind else None
+        q = [summary.nodes(tree) for tree in summary.trees] or [summary.cells.q]
+        if not summary.trees:
             behind = int(found.passed(self._points(q[0])).sum())
         reach = max(float(coarse(self._world).cell.max()), step or 0.0)
         near = int((found.apart(self._points(np.concatenate(q))) <= reach).sum())
-        path, crossed = gather.metrics.best_path, None
+        path, crossed = summary.metrics.best_path, None
         if path is not None:
             way = self._points(self._robot.along(path[1], _ALONG))
             crossed = bool(found.apart(way).min() <= found.high / 2 + found.cell)
-        place = found.place.tolist()
-        sizes = found.low, found.high
-        return Narrow(*sizes, place, parts, behind, through, near, reach, crossed)
+        return Narrow(
+            low=found.low,
+            high=found.high,
+            q=found.place.tolist(),
+            parts=bool(found.behind.any()),
+            behind=behind,
+            through=through,
+            near=near,
+            reach=reach,
+            crossed=crossed,
+        )
 
 
 def at_most(value: float) -> str:
@@ -177,5 +184,5 @@ def at_least(value: float) -> str:
 
 def _digits(value: float, whole: Callable[[float], float]) -> str:
     size = 10.0 ** (np.floor(np.log10(value)) - 2) if value > 0 else 1.0
-    # What rounding alone adds or takes is no reason for another digit.
+    # A rounding error does not change the third digit.
     return f"{whole(round(value / size, 9)) * size:.6g}"

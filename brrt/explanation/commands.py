@@ -1,4 +1,4 @@
-"""A piece of advice: what to try, as a command to paste and as what it plans."""
+"""Advice: what to try, as a command and as what that command plans."""
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,20 +7,20 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from brrt.explanation.diagnosis import limited
+from brrt.explanation.diagnosis import ended_by_budget
 from brrt.explanation.facts import Facts
 from brrt.explanation.report import WIDTH
 from brrt.scenario.command import plan_words, setting_words
 from brrt.scenario.scenario import Scenario
 
 _PLENTY = 1_000_000
-"""Iterations beyond which a run is advised no more than four times as many."""
+"""Iterations beyond which a budget is increased fourfold at most."""
 
 _LITTLE = 20_000
-"""Iterations that take so little time that fewer are not worth advising."""
+"""Iterations that take so little time that smaller budgets are not advised."""
 
 _UNNAMED = "RUN"
-"""Stands in commands for a recording that is in no file."""
+"""The file of a run in memory, in commands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +28,13 @@ class Advice:
     """Something to try.
 
     Attributes:
-        why: The figures that it follows from.
-        words: The command that tries it, but for where it writes.
-        suffix: Of the file that it writes; empty where it only prints.
-        scenario: What it plans from the start; None where it does not.
-        branch: What `BranchedRun` takes, where it goes on from the recording; None where it
-            does not.
-        out: The file that it writes; empty where it only prints.
+        why: The facts that it follows from.
+        words: The command, without its output.
+        suffix: Suffix of the file that the command writes; empty if it only prints.
+        scenario: What the command plans from the start; None if it does not.
+        branch: Keyword arguments of `BranchedRun`, if the command continues the recording; None
+            if it does not.
+        out: The file that the command writes; empty if it only prints.
     """
 
     why: str
@@ -50,19 +50,19 @@ class Advice:
         return shlex.join(self._all())
 
     def numbered(self, number: int, file: str) -> "Advice":
-        """Return the same with a file to write: each advice on each recording has its own."""
+        """Return it with an output of its own, named by the recording and the number."""
         return replace(self, out=f"{Path(file).stem or 'run'}-{number}{self.suffix}")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what a person reads."""
+        """Return reason and command."""
         return {"why": self.why, "command": self.command}
 
     def reason(self, number: int) -> list[str]:
-        """Write why, for a screen of 80 columns."""
+        """Return the reason as lines of 80 columns."""
         return wrap(f"{number}. {self.why}", WIDTH - 1, subsequent_indent="   ")
 
-    def typed(self) -> list[str]:
-        """Write the command for a screen of 80 columns; lines that go on end with a backslash."""
+    def command_lines(self) -> list[str]:
+        """Return the command as lines of 80 columns; all but the last end with a backslash."""
         lines = ["  "]
         for part in _parts(self._all()):
             if len(lines[-1]) + len(part) > WIDTH - 3 and lines[-1].strip():
@@ -76,7 +76,7 @@ class Advice:
 
 
 def _parts(words: Sequence[str]) -> Iterator[str]:
-    """Yield words as a shell takes them, options together with their values."""
+    """Yield words quoted for a shell, options together with their values."""
     part: list[str] = []
     for word in words:
         if word.startswith("--") and part:
@@ -86,18 +86,23 @@ def _parts(words: Sequence[str]) -> Iterator[str]:
     yield shlex.join(part)
 
 
-def look(why: str, *words: str, suffix: str = "") -> Advice:
-    """Advise to look at something.
+def file_of(f: Facts) -> str:
+    """Return the recording's file, as it is written in commands."""
+    return f.file or _UNNAMED
+
+
+def show(why: str, *words: str, suffix: str = "") -> Advice:
+    """Advise a command that plans nothing.
 
     Args:
-        why: What the advice follows from.
-        words: What is typed behind `brrt`.
-        suffix: Of the file that this writes.
+        why: The facts that the advice follows from.
+        words: The command after `brrt`.
+        suffix: Suffix of the file that it writes.
     """
     return Advice(why, ("brrt", *words), suffix)
 
 
-def go_on(
+def resume(
     f: Facts,
     why: str,
     *,
@@ -105,16 +110,16 @@ def go_on(
     params: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Advice:
-    """Advise to go on from the recording with other settings.
+    """Advise to continue the recording with other settings.
 
     Args:
-        f: What is known.
-        why: What the advice follows from.
-        iteration: Where it goes on; by default where planning ended.
-        params: Settings of the planner that are changed.
-        settings: Fields of the scenario that are.
+        f: The facts.
+        why: Those that the advice follows from.
+        iteration: The last iteration that both runs share; by default the end of planning.
+        params: Settings of the planner that change.
+        settings: Fields of the scenario that change.
     """
-    words = ["brrt", "plan", "--from", recording(f)]
+    words = ["brrt", "plan", "--from", file_of(f)]
     words += [] if iteration is None else ["--at-iteration", str(iteration)]
     words += setting_words(settings, params or {})
     branch: dict[str, Any] = {"params": dict(params or {}), "settings": settings}
@@ -122,7 +127,7 @@ def go_on(
     return Advice(why, tuple(words), ".mcap", branch=branch)
 
 
-def change(
+def replan(
     f: Facts,
     why: str,
     *,
@@ -130,20 +135,20 @@ def change(
     params: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Advice:
-    """Advise to run the same with changes; of a run that is a branch, from where it branched off.
+    """Advise to plan from the start with changes; for a branch, from where it branched.
 
     Args:
-        f: What is known.
-        why: What the advice follows from.
+        f: The facts.
+        why: Those that the advice follows from.
         planner: Another planner; `params` are then all that is set.
-        params: Settings of the planner that are changed.
-        settings: Other fields of the scenario; None takes a limit away.
+        params: Settings of the planner that change.
+        settings: Fields of the scenario that change; None removes a limit.
     """
     fixed = set(f.contract.planner.fixed_params)
     if f.manifest.branches and planner is None and not fixed & set(params or {}):
         given = {name: value for name, value in settings.items() if value is not None}
         here = f.manifest.branches[-1].iteration
-        return go_on(f, why, iteration=here, params=params, **given)
+        return resume(f, why, iteration=here, params=params, **given)
     before = f.scenario.params if planner is None else {}
     scenario = replace(
         f.scenario,
@@ -154,27 +159,22 @@ def change(
     return Advice(why, tuple(plan_words(scenario)), ".mcap", scenario)
 
 
-def recording(f: Facts) -> str:
-    """Return what stands for the recording in a command."""
-    return f.file or _UNNAMED
-
-
-def further(
+def extend(
     f: Facts, why: str, times: int, least: int = _LITTLE, params: Mapping[str, Any] | None = None
 ) -> Advice:
-    """Advise a budget that is so many times as large, of the kind that ended the run.
+    """Advise to continue the recording with a multiple of the budget that ended it.
 
     Args:
-        f: What is known.
-        why: What the advice follows from.
-        times: How many times.
-        least: Iterations that are worth a try in any case.
-        params: Settings of the planner that are changed.
+        f: The facts.
+        why: Those that the advice follows from.
+        times: The multiple.
+        least: Iterations that are advised at least.
+        params: Settings of the planner that change.
     """
-    return go_on(f, why, params=params, **_budget(f, times, least))
+    return resume(f, why, params=params, **_budget(f, times, least))
 
 
-def anew(
+def replan_longer(
     f: Facts,
     why: str,
     times: float = 4,
@@ -182,21 +182,21 @@ def anew(
     planner: str | None = None,
     params: Mapping[str, Any] | None = None,
 ) -> Advice:
-    """Advise to run the same with changes, and with a larger budget where it was used up.
+    """Advise to plan from the start with changes, and a larger budget if that ended the run.
 
     Args:
-        f: What is known.
-        why: What the advice follows from.
-        times: How many times as large.
+        f: The facts.
+        why: Those that the advice follows from.
+        times: The multiple of the budget.
         planner: Another planner; `params` are then all that is set.
-        params: Settings of the planner that are changed.
+        params: Settings of the planner that change.
     """
-    more = _budget(f, round(times), 1) if limited(f) else {}
-    return change(f, why, planner=planner, params=params, **more)
+    more = _budget(f, round(times), 1) if ended_by_budget(f) else {}
+    return replan(f, why, planner=planner, params=params, **more)
 
 
 def _budget(f: Facts, times: int, least: int) -> dict[str, Any]:
-    """Return a budget that is so many times as large, of the kind that ended the run."""
+    """Return a multiple of the budget that ended the run."""
     if f.figures["status"] == "time limit" and f.scenario.time is not None:
         return {"time": rounded(times * f.scenario.time)}
     done = max(f.figures["iterations"], 1)
@@ -205,6 +205,6 @@ def _budget(f: Facts, times: int, least: int) -> dict[str, Any]:
 
 
 def rounded(value: float, digits: int = 1) -> float:
-    """Round down to a number of digits, as a rule to one."""
+    """Round down to so many significant digits."""
     size = float(f"1e{f'{value:e}'.partition('e')[2]}") / 10 ** (digits - 1)
     return float(f"{int(value / size * (1 + 1e-12)) * size:.6g}")

@@ -1,4 +1,4 @@
-"""All that an explanation knows: figures, each computed from the recording."""
+"""The facts of an explanation: metrics and places, each computed from the recording."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source
-from brrt.explanation.clearance import Narrow, Way, Ways
-from brrt.explanation.gather import FAILED, Gather
+from brrt.explanation.clearance import Clearance, ClearanceSearch, Narrow
 from brrt.explanation.places import Blocker, Coverage, Gap, Places, Spot
+from brrt.explanation.summary import RunSummary
 from brrt.replay.snapshot import Snapshot
-from brrt.robots import Robot
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
@@ -19,7 +18,7 @@ from brrt.scenario.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-TENTHS = 10
+_TENTHS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,10 +27,10 @@ class Tenth:
 
     Attributes:
         last: Its last iteration.
-        accepted: Share of the extensions that added a node, or of the expansions that were of
-            cells not expanded before; None where there were none.
-        us: Microseconds an iteration; None where nobody measured.
-        nearest: How near to the goal anything had come by its end; None where nothing had.
+        accepted: Share of the extensions that added a node, or of the expansions that were the
+            first of their cells; None without any.
+        us: Microseconds per iteration; None without a real clock.
+        nearest: Least distance to the goal by its end; None without a node or cell.
     """
 
     last: int
@@ -42,16 +41,16 @@ class Tenth:
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """How near to the goal the run came.
+    """The node, or cell, nearest to the goal.
 
     Attributes:
-        far: Distance from there, in the robot's metric.
-        start: How far the start is.
-        q: The nearest node, or cell.
+        far: Its distance to the goal, in the robot's metric.
+        start: The start's distance to the goal.
+        q: Its configuration.
         node: Its number.
-        iteration: When it was reached.
+        iteration: When it was added.
         since: Share of the iterations that came after it.
-        hit: What is on the straight way from it to the goal; None where nothing is.
+        hit: The obstacle on the straight motion from it to the goal; None if that is free.
     """
 
     far: float
@@ -65,13 +64,13 @@ class Approach:
 
 @dataclass(frozen=True, slots=True)
 class Goals:
-    """Draws of the goal, and tries to join it.
+    """Samples of the goal, and motions to it.
 
     Attributes:
         drawn: Samples that were the goal.
-        failed: Of those, how many were rejected.
-        blocked: Tries to join the goal to the newest node that were blocked.
-        blockers: What was in the way of both.
+        failed: Those of them that were rejected.
+        blocked: Motions from the newest node to the goal that were blocked.
+        blockers: The obstacles that blocked both.
     """
 
     drawn: int
@@ -82,15 +81,15 @@ class Goals:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The paths that the planner found, in the order in which it did.
+    """The paths that the planner found, in order.
 
     Attributes:
-        paths: How many.
+        paths: How many there are.
         first: Iteration of the first.
         first_cost: Its cost.
-        best: Iteration of the last, which is the best where a planner improves its path.
+        best: Iteration of the last, which is the best of a planner that improves its path.
         best_cost: Its cost.
-        half_cost: What the path cost after half of the iterations; None before the first.
+        half_cost: Cost of the path after half of the iterations; None without one by then.
     """
 
     paths: int
@@ -106,26 +105,26 @@ class Facts:
     """What is known of a run.
 
     Attributes:
-        manifest: The run's.
-        file: The recording, as the command line takes it; empty where it is in no file.
-        ended: Whether the recording is told to its end, and not to an instant before.
-        contract: What its planner promises, as its step; empty if it is not known.
-        sides: Those of the world's bounds.
-        figures: Those that `brrt replay --json` prints.
-        tenths: The run's course.
+        manifest: The run's manifest.
+        file: The recording's file, as commands name it; empty for a run in memory.
+        ended: Whether the facts are those of the recording's end, not of an earlier instant.
+        contract: What the planner promises; empty if it is not known.
+        sides: Sides of the world's bounds.
+        figures: The metrics, as `brrt replay --json` prints them.
+        tenths: The course of the run.
         trees: Numbers of the trees.
         accepted: Extensions that added a node, or first expansions of cells.
         failed: Extensions that added none, or further expansions of cells.
         reasons: Rejections by reason, most frequent first.
-        blockers: What turned extensions down.
-        spot: Where most were turned down.
-        goals: What came of heading for the goal.
-        approach: How near to it the run came.
-        gap: How near two trees came to each other.
+        blockers: The obstacles that blocked extensions.
+        spot: The place with most rejections.
+        goals: Samples of the goal and their outcome.
+        approach: The node or cell nearest to the goal.
+        gap: How close two trees came.
         coverage: How much of the free space was reached.
-        way: Whether there is one from start to goal, and how wide it is.
-        progress: The paths.
-        cells: What a search on a lattice did; empty for others.
+        clearance: Whether there is a path, and how wide the widest is.
+        progress: The paths that the planner found.
+        cells: Sums over the cells of a lattice search; empty for other planners.
     """
 
     manifest: Manifest
@@ -145,13 +144,13 @@ class Facts:
     approach: Approach | None
     gap: Gap | None
     coverage: Coverage | None
-    way: Way
+    clearance: Clearance
     progress: Progress | None
     cells: dict[str, Any]
 
     @property
     def scenario(self) -> Scenario:
-        """What was run."""
+        """The scenario."""
         return self.manifest.scenario
 
     @property
@@ -161,12 +160,12 @@ class Facts:
 
     @property
     def narrow(self) -> Narrow | None:
-        """The narrowest place on the widest way, where one was found."""
-        return self.way.narrow
+        """The narrowest place on the widest path, if one was found."""
+        return self.clearance.narrow
 
     @property
     def cut(self) -> bool:
-        """Whether planning neither ended nor was it asked how it stood before its end."""
+        """Whether the recording ends within planning."""
         return self.figures["status"] == "running" and self.ended
 
     @property
@@ -180,120 +179,117 @@ class Facts:
         plain = asdict(self)
         for name in ("manifest", "file", "ended"):
             del plain[name]
-        way = plain.pop("way")
-        way["way"] = way.pop("reason")
-        return {**plain, **way, "extent": self.extent, "acceptance": self.acceptance}
+        clearance = plain.pop("clearance")
+        clearance["way"] = clearance.pop("reason")
+        return {**plain, **clearance, "extent": self.extent, "acceptance": self.acceptance}
 
 
-def facts(moment: Snapshot, file: str, robot: Robot, gather: Gather) -> Facts:
-    """Compute everything.
+def facts(snapshot: Snapshot, file: str) -> Facts:
+    """Compute all facts, in one pass over the events.
 
     Args:
-        moment: The run as it stood.
-        file: The recording, as the command line takes it; empty where it is in no file.
-        robot: What moves, settled in the world.
-        gather: What the log says.
+        snapshot: The run at an instant.
+        file: The recording's file, as commands name it; empty for a run in memory.
+
+    Raises:
+        BrrtError: The manifest does not fit its world.
     """
-    manifest, world = moment.recording.manifest, moment.recording.world
-    places = Places(world, robot, gather)
+    run, robot = snapshot.recording, snapshot.recording.robot()
+    manifest, world = run.manifest, run.world
+    summary = RunSummary(manifest, robot)
+    snapshot.feed(summary)
+    places = Places(world, robot, summary)
     start, goal = np.array(manifest.start), np.array(manifest.goal)
-    figures = gather.metrics.as_dict()
-    rejects = gather.rejects.rows()
-    ends = gather.origins(rejects), np.asarray(rejects["q"])
+    figures = summary.metrics.as_dict()
+    last, solved = figures["iterations"], figures["solved"]
+    rejects = summary.rejects.rows()
+    motions = summary.origins(rejects), np.asarray(rejects["q"])
     contract = contract_of(manifest, world)
+    clearance = ClearanceSearch(world, robot, summary).find(start, goal, contract.step)
     return Facts(
         manifest=manifest,
         file=file,
-        ended=not moment.limits,
+        ended=not snapshot.limits,
         contract=contract,
         sides=(world.upper - world.lower).tolist(),
         figures=figures,
-        tenths=_tenths(gather, figures["iterations"], manifest.scenario.clock == "logical"),
-        trees=gather.trees,
-        accepted=int(gather.spans.sums[:, 0].sum()),
-        failed=int(gather.spans.sums[:, 1].sum()),
-        reasons={Reason.label_of(reason): n for reason, n in gather.reasons.most_common()},
-        blockers=places.blockers(*ends),
-        spot=places.spot(*ends),
-        goals=_goals(gather, places),
-        approach=_approach(gather, places, start, goal, robot, figures["iterations"]),
-        gap=places.gap() if not figures["solved"] else None,
-        coverage=places.coverage(*_reached(gather), figures["iterations"]),
-        way=_way(Ways(world, robot, gather), start, goal, contract, solved=figures["solved"]),
-        progress=_progress(gather, figures["iterations"]),
-        cells=gather.cells.as_dict(),
+        tenths=_tenths(summary, last, logical=manifest.scenario.clock == "logical"),
+        trees=summary.trees,
+        accepted=int(summary.bins.sums[:, 0].sum()),
+        failed=int(summary.bins.sums[:, 1].sum()),
+        reasons={Reason.label_of(reason): n for reason, n in summary.reasons.most_common()},
+        blockers=places.blockers(*motions),
+        spot=places.spot(*motions),
+        goals=_goals(summary, places),
+        approach=_approach(summary, places, goal, float(robot.distance(start, goal)), last),
+        gap=None if solved else places.gap(),
+        coverage=places.coverage(*_reached(summary), last),
+        # The path of a solved run proves that there is one.
+        clearance=replace(clearance, connected=True) if solved else clearance,
+        progress=_progress(summary.paths, last),
+        cells=summary.cells.as_dict(),
     )
 
 
-def _way(ways: Ways, start: Floats, goal: Floats, contract: Contract, *, solved: bool) -> Way:
-    way = ways.find(start, goal, contract.step)
-    # That there is one is proven by a run that took it.
-    return replace(way, connected=True) if solved else way
-
-
-def _tenths(gather: Gather, last: int, logical: bool) -> list[Tenth]:
-    spans = gather.spans
-    used = last // spans.length + 1
-    ends = np.unique(np.linspace(0, used, TENTHS + 1).astype(np.int64))
-    t = np.maximum.accumulate(spans.t)
-    nearest = np.minimum.accumulate(spans.nearest)
+def _tenths(summary: RunSummary, last: int, *, logical: bool) -> list[Tenth]:
+    bins = summary.bins
+    used = last // bins.length + 1
+    ends = np.unique(np.linspace(0, used, _TENTHS + 1).astype(np.int64))
+    t = np.maximum.accumulate(bins.t)
+    nearest = np.minimum.accumulate(bins.nearest)
     found = []
     for first, end in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True):
-        good, bad = spans.sums[first:end].sum(axis=0).tolist()
-        before = int(t[first - 1]) if first else int(spans.began)
-        iterations = min(end * spans.length - 1, last) - max(first * spans.length - 1, 0)
+        accepted, failed = bins.sums[first:end].sum(axis=0).tolist()
+        before = int(t[first - 1]) if first else int(bins.began)
+        final = min(end * bins.length - 1, last)
+        iterations = final - max(first * bins.length - 1, 0)
         us = (int(t[end - 1]) - before) / 1e3 / max(iterations, 1)
         near = float(nearest[end - 1])
         found.append(
             Tenth(
-                min(end * spans.length - 1, last),
-                good / (good + bad) if good + bad else None,
-                None if logical else us,
-                near if np.isfinite(near) else None,
+                last=final,
+                accepted=accepted / (accepted + failed) if accepted + failed else None,
+                us=None if logical else us,
+                nearest=near if np.isfinite(near) else None,
             )
         )
     return found
 
 
-def _goals(gather: Gather, places: Places) -> Goals | None:
-    drawn = gather.drawn[int(Source.GOAL)]
-    blocked = gather.reasons[int(Reason.GOAL_BLOCKED)]
+def _goals(summary: RunSummary, places: Places) -> Goals | None:
+    drawn = summary.drawn[int(Source.GOAL)]
+    blocked = summary.reasons[int(Reason.GOAL_BLOCKED)]
     if not drawn and not blocked:
         return None
-    rows = gather.goal_rejects.rows()
-    found = places.blockers(gather.origins(rows), np.asarray(rows["q"]))
-    return Goals(drawn, gather.goal_failed, blocked, found)
+    rows = summary.goal_rejects.rows()
+    blockers = places.blockers(summary.origins(rows), np.asarray(rows["q"]))
+    return Goals(drawn, summary.goal_failed, blocked, blockers)
 
 
 def _approach(
-    gather: Gather, places: Places, start: Floats, goal: Floats, robot: Robot, last: int
+    summary: RunSummary, places: Places, goal: Floats, start: float, last: int
 ) -> Approach | None:
-    near = gather.nearest
+    near = summary.nearest
     if near is None:
         return None
-    hit = places.in_the_way(np.array(near.q), goal) if near.far > 0 else None
-    far, since = float(robot.distance(start, goal)), (last - near.iteration) / max(last, 1)
-    return Approach(near.far, far, near.q, near.node, near.iteration, since, hit)
+    hit = places.hit(np.array(near.q), goal) if near.far > 0 else None
+    since = (last - near.iteration) / max(last, 1)
+    return Approach(near.far, start, near.q, near.node, near.iteration, since, hit)
 
 
-def _reached(gather: Gather) -> tuple[Floats, NDArray[np.int64]]:
-    """Return what was reached by any tree, and when; of cells the time is not kept."""
-    if not gather.trees:
-        q = gather.cells.q
+def _reached(summary: RunSummary) -> tuple[Floats, NDArray[np.int64]]:
+    """Return what the trees reached, and in which iterations; 0 for cells, which keep none."""
+    if not summary.trees:
+        q = summary.cells.q
         return q, np.zeros(len(q), np.int64)
     return (
-        np.concatenate([gather.nodes(tree) for tree in gather.trees]),
-        np.concatenate([gather.iterations(tree) for tree in gather.trees]),
+        np.concatenate([summary.nodes(tree) for tree in summary.trees]),
+        np.concatenate([summary.iterations(tree) for tree in summary.trees]),
     )
 
 
-def _progress(gather: Gather, last: int) -> Progress | None:
-    paths = gather.paths
+def _progress(paths: list[tuple[int, float]], last: int) -> Progress | None:
     if not paths:
         return None
-    half = [cost for iteration, _, cost in paths if iteration <= last / 2]
-    (first, _, first_cost), (best, _, best_cost) = paths[0], paths[-1]
-    return Progress(len(paths), first, first_cost, best, best_cost, half[-1] if half else None)
-
-
-__all__ = ["FAILED", "Facts", "Tenth", "facts"]
+    half = [cost for iteration, cost in paths if iteration <= last / 2]
+    return Progress(len(paths), *paths[0], *paths[-1], half[-1] if half else None)

@@ -1,4 +1,4 @@
-"""Where things happened: what is in the way, what was reached, how near trees came."""
+"""Where extensions were rejected, what was reached, and how close two trees came."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.explanation.gather import Gather
+from brrt.explanation.summary import RunSummary
 from brrt.robots import Robot
 from brrt.verification.collision.motions import Obstacles, first_hits
 from brrt.worlds.free_space import occupied
@@ -16,24 +16,24 @@ from brrt.worlds.world import World
 Floats = NDArray[np.float64]
 
 _CELLS = {2: 256, 3: 512}
-"""Cells of the coarse lattice, in 2D and 3D: 16 x 16, 8 x 8 x 8."""
+"""Coarse cells, in 2D and 3D: 16 x 16, 8 x 8 x 8."""
 
 _POINTS = 8
-"""Random points by which a coarse cell is found free."""
+"""Random points that are tested for a free one in each coarse cell."""
 
 _THIN = 1024
-"""Nodes of a tree that are compared with as many of the other one."""
+"""Nodes of each tree that are compared with those of the other."""
 
 _SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Blocker:
-    """An obstacle that turned extensions down.
+    """An obstacle that blocked extensions.
 
     Attributes:
-        name: As the world numbers it, and where it is.
-        share: Its share of those that something turned down.
+        name: Its kind and number in the world, and its corners.
+        share: Its share of the blocked extensions.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Blocker:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """The cell of a coarse lattice with most rejections.
+    """The coarse cell with the most rejections.
 
     Attributes:
         q: Its middle.
@@ -57,15 +57,15 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """How much of the free space was reached, in cells of a coarse lattice.
+    """How much of the free space was reached, in coarse cells.
 
     Attributes:
-        cells: Cells with anything free in them.
-        share: Share of these with a node, or an expand_counts cell, in them.
+        cells: Cells that are free in part.
+        share: Share of these with a node, or an expanded cell, in them.
         late: Share of the reached ones that were first reached in the run's last third.
-        drought: Share of the run in the longest stretch in which none was reached first.
-        single: Share of the reached ones with a single node in them. As long again, a run reaches
-            about as many new ones as these (Good and Toulmin 1956): few, where it is done.
+        drought: Share of the run in the longest period without a newly reached cell.
+        single: Share of the reached ones with a single node in them. A run of twice the length
+            reaches about as many new cells (Good and Toulmin 1956).
     """
 
     cells: int
@@ -77,13 +77,13 @@ class Coverage:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Two nodes, one of each tree, with little between them: the trees are no farther apart.
+    """Two close nodes, one of each tree.
 
     Attributes:
-        far: How far they are from each other.
-        q: Where the one of tree 0 is.
-        other: Where the one of tree 1 is.
-        hit: What is on the straight way between them; None where nothing is.
+        far: Their distance.
+        q: Configuration of the node of tree 0.
+        other: Configuration of the node of tree 1.
+        hit: The obstacle on the straight motion between them; None if it is free.
     """
 
     far: float
@@ -93,32 +93,37 @@ class Gap:
 
 
 class Places:
-    """A run's world, and what to ask of it.
+    """Finds places in the world of a run.
 
     Args:
         world: The world.
-        robot: What moves, settled in it.
-        gather: What the log says.
+        robot: The robot, resolved in it.
+        summary: The run's log, summed up.
     """
 
-    def __init__(self, world: World, robot: Robot, gather: Gather) -> None:
-        self._world, self._robot, self._gather = world, robot, gather
+    def __init__(self, world: World, robot: Robot, summary: RunSummary) -> None:
+        self._world, self._robot, self._summary = world, robot, summary
         self._obstacles = Obstacles(world)
-        # An arm has no place of its own in the world: its configurations are all angles.
-        self.has_position = robot.configuration(world.lower) is not None
+        # The configurations of an arm are angles, without a position in the world.
+        self._has_position = robot.configuration(world.lower) is not None
 
     def blockers(self, a: Floats, b: Floats) -> list[Blocker]:
-        """Name what motions run into, most frequent first; shapes (n, dof)."""
-        there = np.isfinite(a).all(axis=1)
-        if not there.any():
+        """Name the obstacles that motions hit first, most frequent first.
+
+        Args:
+            a: Where the motions begin, shape (n, dof); rows with nan are left out.
+            b: Where they end, shape (n, dof).
+        """
+        known = np.isfinite(a).all(axis=1)
+        if not known.any():
             return []
-        hits = first_hits(self._obstacles, self._robot, a[there], b[there])
+        hits = first_hits(self._obstacles, self._robot, a[known], b[known])
         found = Counter(hits[hits >= 0].tolist())
         most = found.most_common(_SHOWN)
         return [Blocker(self._name(hit), n / found.total()) for hit, n in most]
 
-    def in_the_way(self, a: Floats, b: Floats) -> str | None:
-        """Name what is on the straight motion between two configurations, shape (dof,)."""
+    def hit(self, a: Floats, b: Floats) -> str | None:
+        """Name the first obstacle on the motion between two configurations, shape (dof,)."""
         hit = int(first_hits(self._obstacles, self._robot, a[None], b[None])[0])
         return self._name(hit) if hit >= 0 else None
 
@@ -130,11 +135,11 @@ class Places:
         return f"{name} ({_numbers(low)} to {_numbers(high)})"
 
     def spot(self, a: Floats, b: Floats) -> Spot | None:
-        """Find where most of some motions are, by their middles; shapes (n, dof)."""
-        there = np.isfinite(a).all(axis=1)
-        if not there.any():
+        """Return the coarse cell with most of the middles of motions; see `blockers`."""
+        known = np.isfinite(a).all(axis=1)
+        if not known.any():
             return None
-        middles = (self._robot.places(a[there]) + self._robot.places(b[there])) / 2
+        middles = (self._robot.places(a[known]) + self._robot.places(b[known])) / 2
         lattice = coarse(self._world)
         cell = np.ravel_multi_index(tuple(lattice.index(middles).T), lattice.shape)
         counts = np.bincount(cell, minlength=int(np.prod(lattice.shape)))
@@ -143,14 +148,14 @@ class Places:
         return Spot(middle.tolist(), lattice.cell.tolist(), float(counts.max() / len(cell)))
 
     def coverage(self, q: Floats, iteration: NDArray[np.int64], last: int) -> Coverage | None:
-        """Measure what part of the free space was reached; None for robots without a place.
+        """Measure what part of the free space was reached; None for robots without a position.
 
         Args:
             q: Configurations that were reached, shape (n, dof).
-            iteration: When, shape (n,).
+            iteration: In which iteration each was, shape (n,).
             last: The run's last iteration.
         """
-        if not self.has_position or not len(q):
+        if not self._has_position or not len(q):
             return None
         lattice = coarse(self._world)
         n = int(np.prod(lattice.shape))
@@ -171,14 +176,14 @@ class Places:
         return Coverage(int(free.sum()), float(reached.sum() / free.sum()), late, drought, single)
 
     def gap(self) -> Gap | None:
-        """Find two nodes of two trees that are close; None where there are no two trees.
+        """Find two close nodes of two trees; None for fewer trees.
 
-        Of each tree about a thousand nodes are compared; from the closest two of these, the node
-        closest to the other's is looked up in turn until that changes nothing.
+        About a thousand nodes of each tree are compared. From the closest two, the node closest to
+        the other one is searched for in each tree in turn until the distance no longer falls.
         """
-        if len(self._gather.trees) < 2:
+        if len(self._summary.trees) < 2:
             return None
-        one, other = (self._gather.nodes(tree) for tree in self._gather.trees[:2])
+        one, other = (self._summary.nodes(tree) for tree in self._summary.trees[:2])
         thin = one[:: len(one) // _THIN + 1], other[:: len(other) // _THIN + 1]
         rows = [self._robot.distance(thin[1], q) for q in thin[0]]
         best = int(np.argmin([row.min() for row in rows]))
@@ -187,11 +192,11 @@ class Places:
             far = now
             b = other[int(self._robot.distance(other, a).argmin())]
             a = one[int(self._robot.distance(one, b).argmin())]
-        return Gap(far, a.tolist(), b.tolist(), self.in_the_way(a, b))
+        return Gap(far, a.tolist(), b.tolist(), self.hit(a, b))
 
 
 def coarse(world: World) -> Raster:
-    """Return the coarse cells in which shares of the free space are counted."""
+    """Return the coarse cells that shares of the free space are counted in."""
     return Raster.over(world.lower, world.upper, _CELLS[world.dim])
 
 

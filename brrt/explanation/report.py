@@ -1,4 +1,4 @@
-"""An explanation in words: rows of a name and what there is to say, for a screen of 80 columns."""
+"""The facts in words: rows of a name and a text, for a screen of 80 columns."""
 
 from collections.abc import Iterator, Sequence
 from math import dist
@@ -7,6 +7,8 @@ from textwrap import wrap
 from brrt.explanation.clearance import Narrow, at_least
 from brrt.explanation.diagnosis import width_of
 from brrt.explanation.facts import Facts
+from brrt.explanation.places import Blocker
+from brrt.replay.text import counted, seconds, vector
 from brrt.scenario.contracts import changes_of
 
 Row = tuple[str, str]
@@ -15,72 +17,74 @@ WIDTH = 79
 """Columns that are written to: the last one of 80 stays free."""
 
 _CORNER = 0.1
-"""Of the map's longest side, how far a corner of it reaches."""
+"""Distance from start or goal within which a place is close to it, as part of the extent."""
 
 _SOME = 0.05
-"""Of the iterations, what is told of the goal's rejected draws."""
+"""Share of the iterations from which on rejected samples of the goal are given in percent."""
 
 _END = 0.005
-"""Of a run, what is too little to name in percent."""
+"""Share of the run that counts as its very end."""
 
 
 def rows(f: Facts) -> Iterator[Row]:
-    """Tell the facts, the outcome first."""
+    """Yield the facts, the outcome first."""
     scenario = f.scenario
     yield "run", f"{scenario.planner} · {scenario.robot} · {scenario.world} · seed {scenario.seed}"
     for branch, change in zip(f.manifest.branches, changes_of(f.manifest), strict=True):
-        file = branch.file or "another run"
-        yield "from", f"{file}, behind iteration {branch.iteration:,}: {change}"
+        parent = branch.file or "another run"
+        yield "branched", f"from {parent} after iteration {branch.iteration:,}: {change}"
     yield "outcome", _outcome(f)
-    yield "grown", _grown(f)
+    yield ("cells" if f.cells else "tree" if len(f.trees) < 2 else "trees"), _reached(f)
     yield from _course(f)
     yield from _rejected(f)
-    yield "way", _way(f)
+    yield "clearance", _clearance(f)
     yield from _goal(f)
     yield from _paths(f)
-    yield from _cells(f)
-    yield from _driven(f)
+    yield from _moves(f)
+    yield from _execution(f)
 
 
 def _outcome(f: Facts) -> str:
     figures = f.figures
-    time = "" if figures["plan_time_s"] is None else f" in {_seconds(figures['plan_time_s'])}"
+    time = "" if figures["plan_time_s"] is None else f" in {seconds(figures['plan_time_s'])}"
     effort = f"{counted(figures['iterations'], 'iteration')}{time}"
+    path = f"path of cost {_number(figures['path_cost'])}"
     if f.cut:
-        found = f"with a path of {_g(figures['path_cost'])}" if figures["solved"] else "not solved"
-        return f"cut short, {found}: the recording breaks off after {effort}"
+        found = f"with a {path}" if figures["solved"] else "without a path"
+        return f"the recording is cut after {effort}, {found}"
     if figures["solved"]:
         status = figures["status"]
-        ended = {"solved": "", "running": "; planning goes on"}.get(status, f", ended by: {status}")
-        return f"solved, a path of {_g(figures['path_cost'])} after {effort}{ended}"
+        ended = {"solved": "", "running": "; still planning"}.get(status, f"; ended by {status}")
+        return f"solved: {path} after {effort}{ended}"
     if figures["status"] == "running":
         return f"not solved yet after {effort}"
     return f"not solved: {figures['status']} after {effort}"
 
 
-def _grown(f: Facts) -> str:
-    reached = ""
-    if f.coverage is not None:
-        reached = f"; in {f.coverage.share:.0%} of {f.coverage.cells:,} free cells of the world"
+def _reached(f: Facts) -> str:
     if f.cells:
         again = f.cells["expansions"] - f.cells["cells"]
-        return f"{counted(f.cells['cells'], 'cell')} expanded, and {again:,} again{reached}"
-    tried = f.accepted + f.failed
-    accepted = ""
-    if f.acceptance is not None:
-        accepted = f" from {counted(tried, 'extension')}, {f.acceptance:.0%}"
-    return f"{counted(f.figures['nodes'], 'node')}{accepted}{reached}"
+        texts = [f"{f.cells['cells']:,} expanded, {counted(again, 'repeated expansion')}"]
+    else:
+        texts = [counted(f.figures["nodes"], "node")]
+        if f.acceptance is not None:
+            tried = counted(f.accepted + f.failed, "extension")
+            texts.append(f"{f.acceptance:.0%} of {tried} accepted")
+    if f.coverage is not None:
+        c = f.coverage
+        texts.append(f"reached {c.share:.0%} of the free space ({c.cells:,} coarse cells)")
+    return "; ".join(texts)
 
 
 def _course(f: Facts) -> Iterator[Row]:
-    """Yield a table of the run's tenths, a column for each."""
+    """Yield the tenths of the run as a table, a column for each."""
     if len(f.tenths) < 2:
         return
     yield "iteration", _columns([_short(tenth.last) for tenth in f.tenths])
     for name, values in (
         ("% new cells" if f.cells else "% accepted", [_percent(t.accepted) for t in f.tenths]),
         ("us each", [None if t.us is None else f"{t.us:.3g}" for t in f.tenths]),
-        ("from goal", [None if t.nearest is None else f"{t.nearest:.3g}" for t in f.tenths]),
+        ("to goal", [None if t.nearest is None else f"{t.nearest:.3g}" for t in f.tenths]),
     ):
         if any(value is not None for value in values):
             yield name, _columns(["-" if value is None else value for value in values])
@@ -109,89 +113,82 @@ def _rejected(f: Facts) -> Iterator[Row]:
     counts = ", ".join(f"{reason} {n:,}" for reason, n in f.reasons.items())
     yield "rejected", f"{total:,}: {counts}" if len(f.reasons) > 1 else counts
     if f.blockers:
-        yield "by", ", ".join(f"{each.name} {each.share:.0%}" for each in f.blockers)
+        yield "blocked by", _shares(f.blockers)
     if f.spot is not None and f.spot.share >= 0.05:
         sides = " x ".join(f"{side:.3g}" for side in f.spot.sides)
-        yield "most", f"{f.spot.share:.0%} within {sides} around {place(f.spot.q)}"
+        yield "region", f"{f.spot.share:.0%} of them within {sides} around {place(f.spot.q)}"
 
 
-def _way(f: Facts) -> str:
-    solved, narrow = f.figures["solved"], f.narrow
+def _shares(blockers: Sequence[Blocker]) -> str:
+    return ", ".join(f"{each.name} {each.share:.0%}" for each in blockers)
+
+
+def _clearance(f: Facts) -> str:
+    solved, narrow, known = f.figures["solved"], f.narrow, f.clearance
     if narrow is None:
-        if solved and f.way.widest is not None:
-            return f"there is one: the run found it, but {f.way.reason}"
-        known = {True: "there is one", False: "there is none", None: "unknown"}[f.way.connected]
-        return f"{known}: {'the run found it' if solved else f.way.reason}"
-    width = f"{width_of(f)} wide where it is narrowest"
-    told = [f"the widest one is {width}, {_where(f, narrow)}"]
-    if f.way.body and narrow.low < f.way.body:
-        told.append(f"this body is at least {at_least(f.way.body)} wide")
+        if solved and known.widest is not None:
+            return f"the run found a path, but {known.reason}"
+        if solved:
+            return "a path exists: the run found one"
+        exists = {True: "a path exists", False: "no path exists", None: "unknown"}
+        return f"{exists[known.connected]}: {known.reason}"
+    texts = [f"the widest path is {width_of(f)} wide at its narrowest place, {_where(f, narrow)}"]
+    if known.body and narrow.low < known.body:
+        texts.append(f"the body is at least {at_least(known.body)} wide")
     if solved and narrow.crossed is not None:
-        way = "leads through there" if narrow.crossed else "takes another way"
-        told.append(f"the path {way}")
+        texts.append(f"the run's path {'leads through it' if narrow.crossed else 'avoids it'}")
     if narrow.parts and not (solved and (len(f.trees) > 1 or not narrow.crossed)):
-        told.append(_passed(narrow, "cell" if f.cells else "node"))
-    return "; ".join(told)
+        texts.append(_beyond(narrow, "cell" if f.cells else "node"))
+    return "; ".join(texts)
 
 
 def _where(f: Facts, narrow: Narrow) -> str:
-    """Write where the narrowest place is; that of start or goal itself is no passage."""
-    at = f"at {place(narrow.q)}"
+    """Write where the narrowest place is; next to start or goal it is no passage."""
     for name, end in (("start", f.manifest.start), ("goal", f.manifest.goal)):
         near = min(narrow.high, _CORNER * f.extent)
-        if f.way.body == 0 and dist(narrow.q, end[: len(narrow.q)]) <= near:
-            return f"{at}, close to the {name}"
-    return at
+        if f.clearance.body == 0 and dist(narrow.q, end[: len(narrow.q)]) <= near:
+            return f"{place(narrow.q)}, close to the {name}"
+    return place(narrow.q)
 
 
-def _passed(narrow: Narrow, what: str) -> str:
+def _beyond(narrow: Narrow, what: str) -> str:
     if not narrow.behind:
-        near = "" if narrow.near else f", none came within {narrow.reach:.3g} of it"
+        near = "" if narrow.near else f", and none came within {narrow.reach:.3g} of it"
         return f"no {what} got through{near}"
-    when = "" if narrow.through is None else f", from iteration {narrow.through:,} on"
-    lie = "lies" if narrow.behind == 1 else "lie"
-    return f"{counted(narrow.behind, what)} {lie} behind it{when}"
+    first = "" if narrow.through is None else f", the first in iteration {narrow.through:,}"
+    are = "is" if narrow.behind == 1 else "are"
+    return f"{counted(narrow.behind, what)} {are} beyond it{first}"
 
 
 def _goal(f: Facts) -> Iterator[Row]:
-    near = f.approach
+    near, gap, goals = f.approach, f.gap, f.goals
     if near is not None and near.far > 0 and not f.figures["solved"]:
         what = "cell" if f.cells else "node"
-        hit = f"; {near.hit} is on the straight way" if near.hit else ""
+        far, start = _number(near.far), _number(near.start)
+        texts = [f"{what} {near.node:,} at {place(near.q)}, {far} from the goal (start: {start})"]
+        if near.since < _END:
+            texts.append("reached at the very end")
+        else:
+            texts.append(f"no nearer {what} in the last {near.since:.0%} of the run")
+        texts += [f"{near.hit} blocks the straight motion"] if near.hit else []
+        yield "nearest", "; ".join(texts)
+    if gap is not None:
+        hit = f"; {gap.hit} is between them" if gap.hit else ""
         yield (
-            "nearest",
-            (
-                f"{what} {near.node:,} at {place(near.q)}, {_g(near.far)} from the goal "
-                f"(the start: {_g(near.start)}); {_since(near.since)}{hit}"
-            ),
+            "gap",
+            f"the trees are {gap.far:.4g} apart, at {place(gap.q)} and {place(gap.other)}{hit}",
         )
-    if f.gap is not None:
-        hit = f"; between them {f.gap.hit}" if f.gap.hit else ""
-        ends = f"{place(f.gap.q)} and {place(f.gap.other)}"
-        yield "gap", f"the trees come within {f.gap.far:.4g} of each other, at {ends}{hit}"
-    goals = f.goals
     if goals is not None:
-        told = []
+        texts = []
         if goals.drawn:
-            drawn, failed = (counted(n, "time") for n in (goals.drawn, goals.failed))
             share = goals.failed / max(f.figures["iterations"], 1)
-            of_all = f" ({share:.0%} of the iterations)" if share >= _SOME else ""
-            told.append(f"drawn {drawn}, rejected {failed}{of_all}")
+            part = f" ({share:.0%} of the iterations)" if share >= _SOME else ""
+            times = counted(goals.drawn, "time")
+            texts.append(f"sampled {times}, rejected {counted(goals.failed, 'time')}{part}")
         if goals.blocked:
-            told.append(f"out of reach by the last motion {counted(goals.blocked, 'time')}")
-        by = ", ".join(f"{each.name} {each.share:.0%}" for each in goals.blockers[:2])
-        yield "goal", "; ".join(told) + (f"; by {by}" if by else "")
-
-
-def _since(share: float) -> str:
-    if share < _END:
-        return f"it came nearer {late(share)}"
-    return f"none nearer in the last {share:.0%}"
-
-
-def late(share: float) -> str:
-    """Write until when a run got somewhere, by the share of it that came after."""
-    return "up to the very end" if share < _END else f"until the last {share:.0%} of the run"
+            texts.append(f"motion to it blocked {counted(goals.blocked, 'time')}")
+        texts += [f"blocked by {_shares(goals.blockers[:2])}"] if goals.blockers else []
+        yield "goal", "; ".join(texts)
 
 
 def _paths(f: Facts) -> Iterator[Row]:
@@ -202,79 +199,61 @@ def _paths(f: Facts) -> Iterator[Row]:
     if f.approach is not None and f.approach.start > 0:
         straight = f", {p.best_cost / f.approach.start:.3g} times the straight line"
     if p.paths == 1:
-        yield "path", f"{_g(p.best_cost)}{straight}, found in iteration {p.first:,}"
+        cost = _number(p.best_cost)
+        yield "path", f"cost {cost}{straight}, found in iteration {p.first:,}"
         return
-    half = "" if p.half_cost is None else f", {_g(p.half_cost)} half-way"
-    yield (
-        "paths",
-        (
-            f"the first in iteration {p.first:,} cost {_g(p.first_cost)}{half}, the last of "
-            f"{p.paths:,} in {p.best:,} {_g(p.best_cost)}{straight}"
-        ),
-    )
+    costs = [f"{_number(p.first_cost)} in iteration {p.first:,}"]
+    costs += [] if p.half_cost is None else [f"{_number(p.half_cost)} after half of the run"]
+    costs.append(f"{_number(p.best_cost)} in iteration {p.best:,}{straight}")
+    yield "paths", f"{p.paths:,}, cost {', '.join(costs)}"
 
 
-def _cells(f: Facts) -> Iterator[Row]:
+def _moves(f: Facts) -> Iterator[Row]:
     cells = f.cells
     if not cells or not cells["moves"] or not f.contract.learns:
         return
     busiest, deepest = cells["busiest"], cells["deepest"]
-    often = cells["moves_per_cell"]
     entered = "each cell was entered once"
     if busiest["visits"] > 1:
-        most = f"that at {place(busiest['q'])} {counted(busiest['visits'], 'time')}"
-        entered = f"each cell was entered {often:.3g} times on average, {most}"
+        most = f"{place(busiest['q'])} {counted(busiest['visits'], 'time')}"
+        entered = f"each cell was entered {cells['moves_per_cell']:.3g} times on average, {most}"
     yield "moves", f"{cells['moves']:,}; {entered}"
     if deepest["learnt"] > 0:
-        yield (
-            "learnt",
-            (
-                f"{counted(cells['raised'], 'estimate')} rose, that at {place(deepest['q'])} "
-                f"most: by {_g(deepest['learnt'])} to {_g(deepest['estimate'])}"
-            ),
-        )
+        rose = f"{_number(deepest['learnt'])} to {_number(deepest['estimate'])}"
+        yield "estimates", f"{cells['raised']:,} rose, most at {place(deepest['q'])}: by {rose}"
 
 
-def _driven(f: Facts) -> Iterator[Row]:
+def _execution(f: Facts) -> Iterator[Row]:
     figures = f.figures
     if figures["max_move_time_s"] is None:
         return
-    misses, deadline = figures["deadline_misses"], f.scenario.deadline
-    stood = counted(figures["stays"], "deadline")
-    late = f"{misses:,} later than {deadline:g} s, {stood} stood still"
-    yield (
-        "driven",
-        f"{counted(figures['moves'], 'move')}, the slowest in "
-        f"{_seconds(figures['max_move_time_s'])}; "
-        + (late if misses else f"all within {deadline:g} s"),
-    )
+    deadline, misses = f.scenario.deadline, figures["deadline_misses"]
+    late = f"all within the deadline of {deadline:g} s"
+    if misses:
+        stays = counted(figures["stays"], "deadline")
+        late = f"{misses:,} missed the deadline of {deadline:g} s, the robot stayed for {stays}"
+    slowest = seconds(figures["max_move_time_s"])
+    moves = counted(figures["moves"], "move")
+    yield "execution", f"{moves}, the slowest planned in {slowest}; {late}"
 
 
-def _seconds(value: float) -> str:
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if value >= size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value * 1e6:.3g} us"
+def late(share: float) -> str:
+    """Write until when a run progressed, by the share of the run that came after."""
+    return "up to the very end" if share < _END else f"until the last {share:.0%} of the run"
 
 
-def _g(value: float | None) -> str:
+def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.5g}"
 
 
-def place(q: list[float]) -> str:
-    """Write a configuration, or a place."""
-    return "(" + ", ".join(f"{x:.4g}" for x in q) + ")"
-
-
-def counted(n: int, one: str) -> str:
-    """Write a number of things: `1 node`, `1,200 nodes`."""
-    return f"{n:,} {one if n == 1 else one + 's'}"
+def place(q: Sequence[float]) -> str:
+    """Write a configuration or a point in four digits."""
+    return vector(q, 4)
 
 
 def table(found: Sequence[Row]) -> Iterator[str]:
-    """Yield the lines of rows for a screen of 80 columns."""
+    """Yield rows as lines of 80 columns."""
     width = max(len(name) for name, _ in found) + 2
     for name, text in found:
-        lines = wrap(text, WIDTH - width, break_on_hyphens=False)
-        for i, line in enumerate(lines):
+        for i, line in enumerate(wrap(text, WIDTH - width, break_on_hyphens=False)):
             yield ("" if i else name).ljust(width) + line

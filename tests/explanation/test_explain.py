@@ -28,8 +28,8 @@ from brrt import (
 )
 from brrt.events import Reason, Source, table_dtype
 from brrt.explanation import Advice, Explanation, explain
-from brrt.explanation.clearance import Ways
-from brrt.explanation.gather import FAILED, Gather, Spans, Thinned
+from brrt.explanation.clearance import ClearanceSearch
+from brrt.explanation.summary import FAILED, IterationBins, RunSummary, ThinnedRejects
 from brrt.scenario.manifest import Manifest
 from tests.conftest import Result, recorded
 from tests.support import toys
@@ -115,24 +115,24 @@ def test_cells_are_summed_up() -> None:
 @given(st.lists(st.integers(0, 40_000), min_size=1, max_size=60))
 def test_spans_are_bins(iterations: list[int]) -> None:
     """Sums by spans, whose length doubles on the way, are those of the final length."""
-    spans, dtype = Spans(), table_dtype(Kind.EDGE, 2)
+    bins, dtype = IterationBins(), table_dtype(Kind.EDGE, 2)
     for iteration in sorted(iterations):
         table = np.zeros(1, dtype)
         table["iteration"] = iteration
-        spans.reach(iteration)
-        spans.count(table, 0)
-        spans.approach(table, np.array([float(iteration)]))
-    at = np.array(iterations) // spans.length
-    assert spans.sums[:, 0].tolist() == np.bincount(at, minlength=len(spans.sums)).tolist()
+        bins.reach(iteration)
+        bins.count(table, 0)
+        bins.approach(table, np.array([float(iteration)]))
+    at = np.array(iterations) // bins.length
+    assert bins.sums[:, 0].tolist() == np.bincount(at, minlength=len(bins.sums)).tolist()
     for place in np.unique(at).tolist():
-        assert spans.nearest[place] == min(i for i in iterations if i // spans.length == place)
+        assert bins.nearest[place] == min(i for i in iterations if i // bins.length == place)
 
 
 @settings(max_examples=40)
 @given(st.lists(st.integers(0, 30), max_size=30))
 def test_thinned_rows_are_even(sizes: list[int]) -> None:
     """What is kept of rejections is every n-th, from the first on, at most twice the limit."""
-    thinned, seen = Thinned(2, most=10), 0
+    thinned, seen = ThinnedRejects(2, most=10), 0
     for size in sizes:
         table = np.zeros(size, table_dtype(Kind.REJECT, 2))
         table["seq"] = np.arange(seen, seen + size)
@@ -150,7 +150,7 @@ def test_what_is_in_the_way_is_named() -> None:
     found = explained(GAP).facts
     assert [each.name.split(" (")[0] for each in found.blockers] == ["box 0", "box 1"]
     assert sum(each.share for each in found.blockers) == pytest.approx(1)
-    assert found.way.connected
+    assert found.clearance.connected
     assert found.narrow is not None
     assert found.narrow.low <= 5 <= found.narrow.high
     tree_goes_through = found.narrow.behind > 0
@@ -271,8 +271,8 @@ def test_a_body_that_gets_through_is_not_too_wide(gap: float, dx: float, dy: flo
         for q in robot.interpolate(a, b, np.linspace(0, 1, 40))
     )
     ends = tuple(start.tolist()), tuple(goal.tolist())
-    gather = Gather(Manifest(Scenario(), *ends, dim=2, dof=3, epoch_ns=0, made_by={}), robot)
-    found = Ways(world, robot, gather).find(start, goal, 5.0)
+    summary = RunSummary(Manifest(Scenario(), *ends, dim=2, dof=3, epoch_ns=0, made_by={}), robot)
+    found = ClearanceSearch(world, robot, summary).find(start, goal, 5.0)
     assert found.body == pytest.approx(7)
     assert free
     assert not found.too_narrow

@@ -1,4 +1,4 @@
-"""What an explanation needs of a log: one pass, whose memory grows with the trees alone."""
+"""A log summed up for an explanation, in one pass; memory grows only with the trees."""
 
 from collections import Counter
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status, Table, table_dtype
-from brrt.explanation.lattice import Cells
+from brrt.explanation.cells import CellSummary
 from brrt.replay.metrics import Metrics
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
@@ -16,57 +16,58 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST = 10_000
-"""Rejections that are looked at closely at most, evenly spread over the run."""
+"""Rejections whose geometry is examined, evenly spread over the run."""
 
 FAILED = (Reason.COLLISION, Reason.NO_PROGRESS, Reason.LIMITS, Reason.NO_GAIN)
-"""Reasons for which an extension adds no node; others are further tries around a node."""
+"""Reasons for which an extension adds no node; the others concern further tries near a node."""
 
-_PARTS = 4096
+_BINS = 4096
 
 
-class Spans:
-    """Sums over spans of iterations of one length, which doubles as the run grows longer.
+class IterationBins:
+    """Sums over bins of successive iterations, whose length doubles as the run grows.
 
     Attributes:
-        sums: For each span: nodes that joined, extensions that failed, shape (spans, 2).
-        t: When its last event was, ns; 0 where there is none, shape (spans,).
-        nearest: How near to the goal a node joined, shape (spans,).
-        began: When planning began, ns.
+        length: Iterations in a bin.
+        sums: For each bin: nodes added, extensions rejected, shape (bins, 2).
+        t: Time of its last event in ns; 0 without one, shape (bins,).
+        nearest: Least distance of its nodes to the goal, shape (bins,).
+        began: When planning began, in ns.
     """
 
     def __init__(self) -> None:
         self.length = 1
-        self.sums = np.zeros((_PARTS, 2), np.int64)
-        self.t = np.zeros(_PARTS, np.int64)
-        self.nearest = np.full(_PARTS, np.inf)
+        self.sums = np.zeros((_BINS, 2), np.int64)
+        self.t = np.zeros(_BINS, np.int64)
+        self.nearest = np.full(_BINS, np.inf)
         self.began = 0
 
     def reach(self, iteration: int) -> None:
-        """Double the length until an iteration has its span."""
-        while iteration // self.length >= _PARTS:
+        """Double the length until an iteration has a bin."""
+        while iteration // self.length >= _BINS:
             self.length *= 2
-            rest = np.zeros((_PARTS // 2, 2), np.int64)
+            rest = np.zeros((_BINS // 2, 2), np.int64)
             self.sums = np.concatenate([self.sums.reshape(-1, 2, 2).sum(axis=1), rest])
             self.t = np.concatenate([self.t.reshape(-1, 2).max(axis=1), rest[:, 0]])
             nearest = self.nearest.reshape(-1, 2).min(axis=1)
-            self.nearest = np.concatenate([nearest, np.full(_PARTS // 2, np.inf)])
+            self.nearest = np.concatenate([nearest, np.full(_BINS // 2, np.inf)])
 
     def count(self, table: Table, column: int) -> None:
-        """Add rows to a column of sums; their iterations must have been reached."""
+        """Add rows to a column of sums, once `reach` was called for their iterations."""
         at = table["iteration"] // self.length
-        self.sums[:, column] += np.bincount(at, minlength=_PARTS)
+        self.sums[:, column] += np.bincount(at, minlength=_BINS)
 
     def approach(self, table: Table, far: Floats) -> None:
-        """Take in how far nodes are from the goal."""
+        """Take distances of nodes to the goal."""
         np.minimum.at(self.nearest, table["iteration"] // self.length, far)
 
 
-class Thinned:
-    """Rejections; of more than `most` every second, of twice as many every fourth ...
+class ThinnedRejects:
+    """Every k-th rejection, with k doubled whenever twice `most` are exceeded.
 
     Args:
         dof: Numbers in a configuration.
-        most: Rows to keep; there may be up to twice as many.
+        most: Half of the rows kept at most.
     """
 
     def __init__(self, dof: int, most: int = MOST) -> None:
@@ -75,7 +76,7 @@ class Thinned:
         self._kept = 0
 
     def add(self, table: Table) -> None:
-        """Take in rows."""
+        """Take rows."""
         first = -self._seen % self._stride
         self._seen += len(table)
         part = table[first :: self._stride].copy()
@@ -86,84 +87,82 @@ class Thinned:
             self._parts, self._kept, self._stride = [rows], len(rows), 2 * self._stride
 
     def rows(self) -> Table:
-        """Return what was kept."""
+        """Return the rows that were kept."""
         return np.concatenate(self._parts)
 
 
 class Nearest(NamedTuple):
-    """The node or cell nearest to the goal: how far from there, where, its number, and when."""
+    """The node or cell nearest to the goal: distance, configuration, number, iteration."""
 
     far: float
     q: list[float]
     node: int
     iteration: int
-    t: int
 
 
-class Gather:
+class RunSummary:
     """A fold over a run.
 
     Args:
-        manifest: The run's.
-        robot: What moves, settled in the world.
+        manifest: The run's manifest.
+        robot: The robot, resolved in the world.
 
     Attributes:
-        metrics: The run's figures.
-        spans: Sums over the course of the run.
+        metrics: The run's metrics.
+        bins: Sums over the course of the run.
         reasons: Rejections by reason.
         rejects: Rejections, thinned.
-        goal_rejects: Those in answer to a draw of the goal, or to a try to join it, thinned.
+        goal_rejects: Those of draws of the goal, and of motions to the goal, thinned.
         drawn: Samples by source.
         goal_failed: Draws of the goal that were rejected.
-        nearest: The start's tree's node nearest to the goal, or the cell; None without any.
-        cells: What a search on a lattice looked at.
-        paths: Iteration, time (ns) and cost of each path that the planner found, better ones
-            after worse.
+        nearest: The cell, or the node of the start's tree, nearest to the goal; None without one.
+        paths: Iteration and cost of each path that the planner found, in order.
+        cells: The cells of a lattice search.
     """
 
     def __init__(self, manifest: Manifest, robot: Robot) -> None:
         self._robot, self._goal, self._dof = robot, np.array(manifest.goal), manifest.dof
-        self.metrics, self.spans = Metrics(manifest), Spans()
+        self.metrics, self.bins = Metrics(manifest), IterationBins()
         self.reasons: Counter[int] = Counter()
-        self.rejects, self.goal_rejects = Thinned(self._dof), Thinned(self._dof, MOST // 5)
+        self.rejects = ThinnedRejects(self._dof)
+        self.goal_rejects = ThinnedRejects(self._dof, MOST // 5)
         self.drawn: Counter[int] = Counter()
         self.goal_failed = 0
         self.nearest: Nearest | None = None
-        self.paths: list[tuple[int, int, float]] = []
-        self.cells = Cells(robot, self._goal)
+        self.paths: list[tuple[int, float]] = []
+        self.cells = CellSummary(robot, self._goal)
         self._nodes: dict[int, list[Floats]] = {}
-        self._when: dict[int, list[Ints]] = {}
+        self._iterations: dict[int, list[Ints]] = {}
         self._last_draw = np.empty(0, np.int64)
 
     def write(self, events: Events) -> None:
-        """Take in a batch."""
+        """Take a batch."""
         self.metrics.write(events)
         reached = (int(table["iteration"].max()) for table in events.tables.values() if len(table))
-        self.spans.reach(max(reached, default=0))  # in a doctored log they may fall
+        self.bins.reach(max(reached, default=0))  # in a damaged log they may fall
         for kind in (Kind.SAMPLE, Kind.EXPAND, Kind.MOVE, Kind.EDGE):
             table = events[kind]
             if len(table):
-                np.maximum.at(self.spans.t, table["iteration"] // self.spans.length, table["t"])
+                np.maximum.at(self.bins.t, table["iteration"] // self.bins.length, table["t"])
         if Kind.EDGE in events.counts:
-            self._join(events[Kind.EDGE])
+            self._add_nodes(events[Kind.EDGE])
         if Kind.EXPAND in events.counts or Kind.MOVE in events.counts:
-            self._look(events)
-        self._reject(events)
+            self._add_expansions(events)
+        self._add_rejects(events)
         for phase in events[Kind.PHASE]:
             if phase["name"] == Phase.PLAN and phase["status"] == Status.BEGIN:
-                self.spans.began = int(phase["t"])
+                self.bins.began = int(phase["t"])
         for path in events[Kind.PATH]:
             if path["stage"] != Stage.SMOOTHED:
-                row = int(path["iteration"]), int(path["t"]), float(path["cost"])
-                self.paths.append(row)
+                self.paths.append((int(path["iteration"]), float(path["cost"])))
 
     def nodes(self, tree: int) -> Floats:
         """Configurations of a tree's nodes, shape (n, dof)."""
         return np.concatenate([np.empty((0, self._dof)), *self._nodes.get(tree, [])])
 
     def iterations(self, tree: int) -> Ints:
-        """When they joined, shape (n,)."""
-        return np.concatenate([np.empty(0, np.int64), *self._when.get(tree, [])])
+        """Iterations in which they were added, shape (n,)."""
+        return np.concatenate([np.empty(0, np.int64), *self._iterations.get(tree, [])])
 
     @property
     def trees(self) -> list[int]:
@@ -171,7 +170,7 @@ class Gather:
         return sorted(self._nodes)
 
     def origins(self, rejects: Table) -> Floats:
-        """Where extensions left from, nan where no such node is known, shape (n, dof)."""
+        """Return where extensions began, shape (n, dof); nan for nodes that do not exist."""
         if not self._nodes:
             return self.cells.origins(rejects)
         q = np.full((len(rejects), self._dof), np.nan)
@@ -182,50 +181,48 @@ class Gather:
             q[mine] = nodes[node[mine]]
         return q
 
-    def _look(self, events: Events) -> None:
-        looks = events[Kind.EXPAND]
-        fresh = self.cells.write(events)
-        self.spans.count(looks[fresh], 0)
-        self.spans.count(looks[~fresh], 1)
-        if fresh.any():
-            self._approach(looks[fresh], "cell")
+    def _add_expansions(self, events: Events) -> None:
+        expanded = events[Kind.EXPAND]
+        first = self.cells.write(events)
+        self.bins.count(expanded[first], 0)
+        self.bins.count(expanded[~first], 1)
+        if first.any():
+            self._approach(expanded[first], "cell")
 
     def _approach(self, table: Table, number: str) -> None:
         far = self._robot.distance(table["q"], self._goal)
-        self.spans.approach(table, far)
+        self.bins.approach(table, far)
         at = int(far.argmin())
         if self.nearest is None or far[at] < self.nearest.far:
             row = table[at]
-            when = int(row["iteration"]), int(row["t"])
-            self.nearest = Nearest(float(far[at]), row["q"].tolist(), int(row[number]), *when)
+            n, iteration = int(row[number]), int(row["iteration"])
+            self.nearest = Nearest(float(far[at]), row["q"].tolist(), n, iteration)
 
-    def _join(self, edges: Table) -> None:
-        self.spans.count(edges[edges["parent"] >= 0], 0)
+    def _add_nodes(self, edges: Table) -> None:
+        self.bins.count(edges[edges["parent"] >= 0], 0)
         for tree in np.unique(edges["tree"]).tolist():
             mine = edges[edges["tree"] == tree]
             self._nodes.setdefault(tree, []).append(np.array(mine["q"]))
-            self._when.setdefault(tree, []).append(np.array(mine["iteration"]))
+            self._iterations.setdefault(tree, []).append(np.array(mine["iteration"]))
             if tree == 0:
                 self._approach(mine, "node")
 
-    def _reject(self, events: Events) -> None:
+    def _add_rejects(self, events: Events) -> None:
         rejects, samples = events[Kind.REJECT], events[Kind.SAMPLE]
-        for source, count in zip(*np.unique(samples["source"], return_counts=True), strict=True):
-            self.drawn[int(source)] += int(count)
+        self.drawn.update(samples["source"].tolist())
         goals = samples["iteration"][samples["source"] == Source.GOAL]
-        # What comes of the last draw of a batch may stand in the next one.
+        # The result of the last draw of a batch may be in the next one.
         goals = np.concatenate([self._last_draw, goals])
         if len(samples):
             self._last_draw = samples["iteration"][-1:][samples["source"][-1:] == Source.GOAL]
         if not len(rejects):
             return
-        for reason, count in zip(*np.unique(rejects["reason"], return_counts=True), strict=True):
-            self.reasons[int(reason)] += int(count)
+        self.reasons.update(rejects["reason"].tolist())
         failed = rejects[np.isin(rejects["reason"], [int(reason) for reason in FAILED])]
         if self._nodes:
-            self.spans.count(failed, 1)
+            self.bins.count(failed, 1)
         self.rejects.add(rejects)
-        answers = np.isin(failed["iteration"], goals)
-        self.goal_failed += int(answers.sum())
+        of_goal = np.isin(failed["iteration"], goals)
+        self.goal_failed += int(of_goal.sum())
         tries = rejects[rejects["reason"] == Reason.GOAL_BLOCKED]
-        self.goal_rejects.add(np.concatenate([failed[answers], tries]))
+        self.goal_rejects.add(np.concatenate([failed[of_goal], tries]))

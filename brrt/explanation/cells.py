@@ -1,0 +1,97 @@
+"""Cells of a lattice search, summed up: expansions, moves and estimates of each."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.events import Events, Kind, Table
+from brrt.robots import Robot
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+class CellSummary:
+    """A fold over the events of cells; memory grows with the cells, not with the moves.
+
+    Args:
+        robot: The robot, which measures the distance to the goal.
+        goal: The goal, shape (dof,).
+    """
+
+    def __init__(self, robot: Robot, goal: Floats) -> None:
+        self._robot, self._goal = robot, goal
+        self._q = np.zeros((0, len(goal)))
+        self._expansions, self._visits = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        self._estimate = np.zeros(0)
+        self.moves = 0
+
+    def write(self, events: Events) -> Flags:
+        """Take a batch; return which of its expansions are the first of their cells."""
+        expanded, raised, moves = (events[k] for k in (Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE))
+        cells = [np.asarray(table["cell"], np.int64) for table in (expanded, raised, moves)]
+        self._grow(max((int(each.max(initial=-1)) for each in cells), default=-1) + 1)
+        first = np.zeros(len(expanded), np.bool_)
+        first[np.unique(cells[0], return_index=True)[1]] = True
+        first &= self._expansions[cells[0]] == 0
+        self._q[cells[0]] = expanded["q"]
+        self._expansions += np.bincount(cells[0], minlength=len(self._expansions))
+        new = expanded[first]
+        self._estimate[cells[0][first]] = self._robot.distance(new["q"], self._goal)
+        self._estimate[cells[1]] = raised["h"]  # the last one of a cell is kept
+        entered = cells[2][cells[2] >= 0]
+        self._visits += np.bincount(entered, minlength=len(self._visits))
+        self.moves += len(moves)
+        return first
+
+    def _grow(self, cells: int) -> None:
+        room = len(self._expansions)
+        if cells <= room:
+            return
+        more = max(2 * room, cells, 1024) - room
+        for name in ("_q", "_expansions", "_visits", "_estimate"):
+            old = getattr(self, name)
+            setattr(self, name, np.concatenate([old, np.zeros((more, *old.shape[1:]), old.dtype)]))
+
+    @property
+    def known(self) -> Flags:
+        """Whether each cell was expanded, shape (n,)."""
+        return self._expansions > 0
+
+    @property
+    def q(self) -> Floats:
+        """Configurations of the expanded cells, shape (m, dof)."""
+        return self._q[self.known]
+
+    def origins(self, rejects: Table) -> Floats:
+        """Return where rejected motions began, shape (n, dof); nan for cells never expanded."""
+        q = np.full((len(rejects), self._q.shape[1]), np.nan)
+        cell = np.asarray(rejects["node"], np.int64)
+        exists = (cell >= 0) & (cell < len(self._expansions))
+        exists[exists] = self.known[cell[exists]]
+        q[exists] = self._q[cell[exists]]
+        return q
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the sums, the most visited cell and the one whose estimate rose most."""
+        known = self.known
+        if not known.any():
+            return {}
+        q, visits, estimate = self._q[known], self._visits[known], self._estimate[known]
+        learnt = estimate - self._robot.distance(q, self._goal)
+        deepest, busiest = int(learnt.argmax()), int(visits.argmax())
+        return {
+            "cells": len(q),
+            "expansions": int(self._expansions.sum()),
+            "moves": self.moves,
+            "moves_per_cell": float(visits.sum() / max(int((visits > 0).sum()), 1)),
+            "busiest": {"q": q[busiest].tolist(), "visits": int(visits[busiest])},
+            "raised": int((learnt > 0).sum()),
+            "deepest": {
+                "q": q[deepest].tolist(),
+                "estimate": float(estimate[deepest]),
+                "learnt": float(learnt[deepest]),
+            },
+        }
