@@ -24,28 +24,28 @@ from brrt.scenario.query import Query
 from brrt.settings import param
 
 _FIRST_ROOM = 1 << 18
-"""Cells to make room for at first, where the bounds hold more."""
+"""Cells to allocate at first, where the bounds hold more."""
 
 MOST_DRAWS = 1 << 62
-"""Nothing is drawn, so no number of draws ends a search."""
+"""A search draws nothing, so draws do not limit it."""
 
 
 @dataclass(frozen=True, slots=True)
 class LatticePlanner(KernelPlanner):
-    """What the searches on a lattice have in common; its cells begin at the start."""
+    """Base of searches on a lattice whose origin is the start."""
 
     fixed_params: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
     continuous: ClassVar[str | None] = "rrt-connect"
 
     epsilon: float = param(0.5, "edge of a cell", above=0)
-    diagonals: bool = param(False, "move to all cells around (26 in 3D), not across faces alone")
-    max_move: float = param(1.0, "the goal is reached by a straight move of at most this", low=0)
+    diagonals: bool = param(False, "move to all neighbours (26 in 3D), not only across faces")
+    max_move: float = param(1.0, "longest straight move to the goal", low=0)
 
     def _lattice(self, problem: Problem) -> LatticeArrays:
-        """Make the lattice that knows the start alone.
+        """Make a lattice that holds only the start.
 
         Raises:
-            BrrtError: The robot is no point, or the cells are too small for the world.
+            BrrtError: The robot is not a point, or the cells are too small for the world.
         """
         if not isinstance(problem.robot, Point):
             raise BrrtError(
@@ -68,8 +68,8 @@ class LatticePlanner(KernelPlanner):
 class AStar(LatticePlanner):
     """A* (Hart, Nilsson and Raphael 1968): the shortest path on a lattice around the start.
 
-    Cells are expanded in the order of cost so far plus straight distance to the goal; ties go to
-    the cell closer to the goal, then to the one seen first.
+    Cells are expanded in the order of cost-to-come plus distance to the goal; ties go to the cell
+    closer to the goal, then to the oldest.
     """
 
     def contract(self, query: Query) -> contract.Contract:  # noqa: ARG002

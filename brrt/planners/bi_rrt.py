@@ -1,4 +1,4 @@
-"""Bidirectional RRT (Kuffner and LaValle 2000), in the variants that are in use."""
+"""Bidirectional RRT (Kuffner and LaValle 2000) in its common variants."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -21,27 +21,27 @@ _TURNS = {"alternate": _bi_rrt.ALTERNATE, "smaller": _bi_rrt.SMALLER, "coin": _b
 class BiRRT(KernelPlanner):
     """Bidirectional RRT (Kuffner and LaValle 2000): one tree from the start, one from the goal.
 
-    In each iteration one tree grows towards a sample, and the other one then heads for the newest
-    node of the first. They are joined by a free motion of at most `step`. The defaults are those
-    of RRT-Extend-Extend; `rrt-connect` is the variant that links by connecting.
+    In each iteration one tree grows towards a sample, and the other one then grows towards the
+    newest node of the first. A free motion of at most `step` joins them. The defaults are
+    RRT-Extend-Extend; `rrt-connect` is the variant that links by connecting.
     """
 
     step: float | None = param(
-        None, "longest edge; 5 % of the map's longest side by default", above=0
+        None, "longest edge; by default 5 % of the world's longest side", above=0
     )
     grow: Literal["extend", "connect"] = param(
-        "extend", "towards the sample by one step, or step by step until it is reached or blocked"
+        "extend", "towards the sample: one step, or step by step until it is reached or blocked"
     )
     link: Literal["extend", "connect"] = param(
-        "extend", "towards the other tree's newest node by one step, or step by step"
+        "extend", "towards the other tree's newest node: one step, or step by step"
     )
     turn: Literal["alternate", "smaller", "coin"] = param(
         "alternate",
-        "who grows: the trees in turn; the smaller one; or, with probability 0.5, a tree heads for "
-        "the other's newest node and otherwise the roles swap",
+        "which tree grows: each in turn; the smaller one; or, with probability 0.5, it grows "
+        "towards the other's newest node, and otherwise the roles swap",
     )
     always_link: bool = param(
-        False, "head for the newest node of the other tree even where nothing could be added to it"
+        False, "grow towards the newest node of the other tree even if none was added to it"
     )
 
     def contract(self, query: Query) -> Contract:
@@ -67,7 +67,7 @@ class BiRRT(KernelPlanner):
 
 
 def step_length(step: float | None, query: Query, part: float = 0.05) -> float:
-    """Return the step that was set, or a part of the map's longest side."""
+    """Return the given step, or by default a part of the world's longest side."""
     return step or part * query.world.extent
 
 

@@ -16,17 +16,17 @@ from brrt.settings import param
 
 @dataclass(frozen=True, slots=True)
 class BiRRTStar(StarPlanner):
-    """Bidirectional RRT* (Jordan and Perez 2013): RRT* from the start and from the goal at once.
+    """Bidirectional RRT* (Jordan and Perez 2013): RRT* from the start and from the goal.
 
     The trees take turns: one grows towards a sample, the other towards the new node, and both
-    choose parents and rewire. They are joined where their newest nodes are within
+    choose parents and rewire. They are linked where their newest nodes are within
     `connect_distance` and the motion between them is free. Each better path is recorded.
     """
 
     first_path: ClassVar[str | None] = "rrt-connect"
 
     connect_distance: float | None = param(
-        None, "longest link between the trees; the step by default", above=0
+        None, "longest link between the trees; by default the step", above=0
     )
 
     def options(self, query: Query) -> _rrt_star.RRTStarOptions:

@@ -21,19 +21,19 @@ _FIRST_MOVES = 1 << 12
 
 @dataclass(frozen=True, slots=True)
 class LRTAStar(LatticePlanner):
-    """Learning real-time A* (Korf 1990): look ahead, learn, move, with no path in mind.
+    """Learning real-time A* (Korf 1990): look ahead, learn, move, without a path.
 
-    Before each move the best cells are expanded by A* from where the robot is; their estimates
-    of the cost to the goal are raised to what the cells around them allow, and the robot goes to
-    the best of those. With one cell of lookahead that is Korf's rule; with more it is LSS-LRTA*
-    (Koenig and Sun 2009). Ties go to the cell closer to the goal, by what is known by then, and
-    then to the one seen first; neighbours are looked at in the order +x, -x, +y, -y, +z, -z.
+    Before each move A* expands cells from the robot's; their estimates of the cost-to-go are raised
+    to what their neighbours allow, and the robot moves to the best of those. With a lookahead of
+    one cell that is Korf's rule; with more it is LSS-LRTA* (Koenig and Sun 2009). Ties go to the
+    cell closer to the goal by its current estimate, then to the oldest; neighbours are visited in
+    the order +x, -x, +y, -y, +z, -z.
     """
 
-    resume_hint: ClassVar[str] = "let it start over with what it learnt: --param trials=10"
+    resume_hint: ClassVar[str] = "let it start over with what it has learned: --param trials=10"
 
     lookahead: int = param(1, "cells to expand before a move", low=1, high=_MOST_AHEAD)
-    trials: int = param(1, "times to start over with what was learnt", low=1)
+    trials: int = param(1, "runs from the start, each with what the ones before learned", low=1)
 
     def contract(self, query: Query) -> contract.Contract:  # noqa: ARG002
         """See `Planner.contract`."""

@@ -15,28 +15,28 @@ from brrt.scenario.query import Query
 from brrt.settings import param
 
 _DRAWS_PER_ITERATION = 1000
-"""Where failed draws do not count, a run ends after this many draws for each iteration allowed."""
+"""If failed draws do not count, a run ends after this many draws for each allowed iteration."""
 
 
 @dataclass(frozen=True, slots=True)
 class RRT(KernelPlanner):
-    """Rapidly-exploring random tree (LaValle 1998): one tree, grown from the start.
+    """Rapidly-exploring random tree (LaValle 1998): one tree, rooted at the start.
 
     Each iteration draws a configuration, steers towards it from the nearest node by at most
-    `step`, and adds the new node where the motion is free. It stops at the first path.
+    `step`, and adds the new node if the motion is free. It stops at the first path.
     """
 
     bidirectional: ClassVar[str | None] = "rrt-connect"
 
     step: float | None = param(
-        None, "longest edge; 5 % of the map's longest side by default", above=0
+        None, "longest edge; by default 5 % of the world's longest side", above=0
     )
     goal_bias: float = param(0.05, "probability of drawing the goal", low=0, high=1)
     goal_test: Literal["step", "line-of-sight"] = param(
         "step", "the goal is reached from the newest node within one step, or from any distance"
     )
-    keep_intermediate: bool = param(False, "keep every interpolated point of a vector as a node")
-    slices: int = param(10, "points of a vector, with keep_intermediate", low=1, high=1000)
+    keep_intermediate: bool = param(False, "add every interpolated point of an extension as a node")
+    slices: int = param(10, "points of an extension, with keep_intermediate", low=1, high=1000)
     count_failed: bool = param(True, "draws that add no node count as iterations")
 
     def contract(self, query: Query) -> Contract:

@@ -16,12 +16,12 @@ from brrt.settings import param
 class RRTConnect(KernelPlanner):
     """RRT-Connect (Kuffner and LaValle 2000): two trees, joined greedily.
 
-    One tree makes a step towards a sample, and the other one steps towards the new node until it
-    is reached or blocked; then they swap roles. It stops at the first path.
+    One tree makes a step towards a sample, and the other one makes steps towards the new node until
+    it reaches that or is blocked; then they swap roles. It stops at the first path.
     """
 
     step: float | None = param(
-        None, "longest edge; 5 % of the map's longest side by default", above=0
+        None, "longest edge; by default 5 % of the world's longest side", above=0
     )
 
     def contract(self, query: Query) -> Contract:

@@ -18,24 +18,24 @@ from brrt.scenario.query import Query
 from brrt.settings import param
 
 DEFAULT_STEP = 0.2
-"""Part of the map's longest side: four times RRT's, because the step also bounds how far a node
-looks for parents, and with so few of them a tree improves slowly."""
+"""Part of the world's longest side: four times RRT's, because the step also bounds the distance of
+parents, and a tree with few candidates improves slowly."""
 
 
 @dataclass(frozen=True, slots=True)
 class StarPlanner(KernelPlanner):
-    """What RRT* has in common, with one tree and with two."""
+    """Base of RRT* with one tree and with two."""
 
     default_iterations: ClassVar[int] = 20_000
-    resume_hint: ClassVar[str] = "let it improve on its path: --param stop_at_first=false"
+    resume_hint: ClassVar[str] = "let it improve the path: --param stop_at_first=false"
 
     step: float | None = param(
-        None, "longest edge; 20 % of the map's longest side by default", above=0
+        None, "longest edge; by default 20 % of the world's longest side", above=0
     )
     gamma: float | None = param(
         None,
-        "nodes are near within min(step, gamma (log n / n)^(1/d)); by default 10 % above the "
-        "proven bound, with the volume of the bounds for that of free space",
+        "the radius of near nodes is min(step, gamma (log n / n)^(1/d)); by default 10 % above the "
+        "proven bound, for free space as large as the bounds",
         above=0,
     )
     informed: bool = param(
@@ -80,11 +80,11 @@ class StarPlanner(KernelPlanner):
 
 @dataclass(frozen=True, slots=True)
 class RRTStar(StarPlanner):
-    """RRT* (Karaman and Frazzoli 2011): a tree whose paths come ever closer to the optimum.
+    """RRT* (Karaman and Frazzoli 2011): a tree whose paths converge to the optimum.
 
-    Each new node chooses the parent over which it costs least from the nodes near it, and then
-    becomes the parent of those that it serves better. It goes on until the budget ends; each
-    better path is recorded.
+    Each new node chooses its parent from the nodes near it by the least cost, and then becomes the
+    parent of those whose cost this lowers. It runs until the budget ends; each better path is
+    recorded.
     """
 
     bidirectional: ClassVar[str | None] = "bi-rrt-star"
@@ -107,7 +107,7 @@ def proven_gamma(query: Query) -> float:
     """Return 1.1 times the factor above which RRT* converges to the optimum.
 
     Karaman and Frazzoli 2011, theorem 38: (2 (1 + 1/d) V / B)^(1/d), where V is the volume of free
-    space, here that of the bounds, which is no less, and B that of the robot's unit ball.
+    space, here that of the bounds as its upper limit, and B that of the robot's unit ball.
     """
     d = query.dof
     volume = math.prod((query.upper - query.lower).tolist())

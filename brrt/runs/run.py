@@ -106,7 +106,7 @@ class Run:
             for _ in self._smoother.smooth(path, problem.space, rng, log, stop, 0):
                 pass
         if self._execute is not None:
-            for _ in self._execute.drive(problem.start[None], problem.space, log, stop, 0):
+            for _ in self._execute.follow(problem.start[None], problem.space, log, stop, 0):
                 pass
 
     def events(self) -> Iterator[Events]:
@@ -140,7 +140,7 @@ class Run:
                 yield batch
         # A planner that moves while it plans has reached the goal by now.
         if self._execute is not None and not moved and not self.stop.interrupted:
-            yield from self._execute.drive(waypoints, space, self._log, self.stop, iteration)
+            yield from self._execute.follow(waypoints, space, self._log, self.stop, iteration)
 
     def execute(
         self, sinks: Iterable[Sink] = (), watch: Callable[[Metrics], None] | None = None

@@ -42,7 +42,7 @@ class Lattice(Settings):
     ordered: bool = param(
         False, "ties go to the cell closer to the goal by its current estimate, then to the oldest"
     )
-    trials: int = param(1, "runs from the start, each with what the ones before learnt", low=1)
+    trials: int = param(1, "runs from the start, each with what the ones before learned", low=1)
 
 
 @dataclass(frozen=True, slots=True)

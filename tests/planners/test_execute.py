@@ -35,7 +35,7 @@ def driven(
     dim = path.shape[1]
     space = make_space(Point(), World("empty", np.zeros(dim), np.full(dim, 100.0)))
     log = EventLog(dim, capacity, logical_clock=True)
-    batches = Execute(max_move=max_move).drive(path, space, log, stop or Stop(), 7)
+    batches = Execute(max_move=max_move).follow(path, space, log, stop or Stop(), 7)
     return Events.concat(dim, batches)
 
 
@@ -123,7 +123,7 @@ def test_an_interrupted_robot_stops(cut: int) -> None:
     space = make_space(Point(), World("empty", np.zeros(2), np.full(2, 100.0)))
     log, stop = EventLog(2, 10, logical_clock=True), Stop(interrupted=cut == 0)
     batches = []
-    for number, batch in enumerate(Execute(max_move=1.0).drive(path, space, log, stop, 7), 1):
+    for number, batch in enumerate(Execute(max_move=1.0).follow(path, space, log, stop, 7), 1):
         stop.interrupted |= number == cut
         batches.append(batch)
     events = Events.concat(2, batches)

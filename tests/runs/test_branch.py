@@ -1,4 +1,4 @@
-"""Runs that go on from a recorded state with other settings."""
+"""Runs that branch off a recorded one with other settings."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -45,19 +45,19 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 def parent(scenario: Scenario) -> tuple[Recording, Events]:
-    """A run as its recording, and its log."""
+    """Return a run's recording and log."""
     run, log = recorded(scenario)
     return Recording(run.manifest, run.problem.world, lambda: iter([log]), None, name="parent"), log
 
 
 def child(recording: Recording, **how: Any) -> tuple[BranchedRun, Events]:
-    """A branch, run to its end, and its log."""
+    """Return a branch and its log."""
     run = BranchedRun(recording, **how)
     return run, Events.concat(run.problem.dof, run.events())
 
 
 def last_open(log: Events) -> int:
-    """The last iteration of planning, or the one before where that found a path."""
+    """Return the last iteration of planning, or the one before if that found a path."""
     ends = log[Kind.PHASE]
     end = ends[(ends["name"] == Phase.PLAN) & (ends["status"] != Status.BEGIN)][0]
     return int(end["iteration"]) - int(end["status"] == Status.SOLVED)
@@ -68,7 +68,7 @@ def last_open(log: Events) -> int:
 def test_without_a_change_it_is_the_parent(
     scenario: Scenario, data: st.DataObject, batch: int
 ) -> None:
-    """Wherever it branches, the generator goes on: the same events, smoothing and moves too."""
+    """The generator continues, so all events are the same, smoothing and moves included."""
     recording, log = parent(replace(scenario, smooth=True, execute=True, iterations=400))
     last = last_open(log)
     if last < 1:
@@ -86,10 +86,10 @@ def test_without_a_change_it_is_the_parent(
 
 @FEW
 @given(scenarios, st.data(), st.none() | st.integers(0, 9))
-def test_a_change_holds_from_the_branch_on(
+def test_a_change_rules_from_the_branch_on(
     scenario: Scenario, data: st.DataObject, seed: int | None
 ) -> None:
-    """Its log begins as the parent's, keeps each stretch's promises, and can be made again."""
+    """The log begins as the parent's, keeps the contract of each stretch, and is reproducible."""
     recording, log = parent(replace(scenario, iterations=300))
     last = last_open(log)
     if last < 1:
@@ -114,7 +114,7 @@ def test_a_change_holds_from_the_branch_on(
 
 @pytest.mark.parametrize("planner", sorted(SETTINGS))
 def test_a_failed_run_gets_more_iterations(planner: str) -> None:
-    """The run is the one that had them from the start; so is one that was interrupted."""
+    """It equals the run that had them from the start; so does an interrupted run."""
     scenario = plain("circles2d:n=60,seed=1", planner=planner, iterations=60, seed=5)
     scenario = replace(scenario, params={"step": 1.0})
     recording, _ = parent(scenario)
@@ -134,7 +134,7 @@ def test_a_failed_run_gets_more_iterations(planner: str) -> None:
 
 
 def test_a_branch_of_a_branch() -> None:
-    """Each stretch has its own settings; branching ahead of a branch leaves that one out."""
+    """Each stretch has its own settings; a branch before another one replaces it."""
     recording, _ = parent(plain("circles2d:n=60,seed=2", iterations=300, params={"step": 5.0}))
     world = recording.world
     for n, (iteration, step) in enumerate([(40, 3.0), (80, 2.0), (80, 1.0)], 1):
@@ -157,8 +157,8 @@ def test_a_branch_of_a_branch() -> None:
     assert check(early.manifest, world, events) == []
 
 
-def test_a_first_path_can_be_improved_after_all() -> None:
-    """A star planner that stopped at its first path goes on from there, if it is told to."""
+def test_a_first_path_can_be_improved() -> None:
+    """RRT* that stopped at its first path continues with `stop_at_first=false`."""
     scenario = plain(
         "circles2d:n=20,seed=3", planner="rrt-star", iterations=600, params={"stop_at_first": True}
     )
@@ -175,8 +175,8 @@ def test_a_first_path_can_be_improved_after_all() -> None:
 
 @FEW
 @given(scenarios, st.data())
-def test_the_last_iteration_that_was_over(scenario: Scenario, data: st.DataObject) -> None:
-    """Of an event that is not its iteration's last, the iteration before is meant."""
+def test_the_last_complete_iteration(scenario: Scenario, data: st.DataObject) -> None:
+    """At an event that is not the last of its iteration, the iteration before is complete."""
     _, log = parent(replace(scenario, iterations=100))
     iterations = column(log, "iteration").tolist()
     seq = data.draw(st.integers(0, len(log) - 1))
@@ -193,12 +193,12 @@ def test_the_last_iteration_that_was_over(scenario: Scenario, data: st.DataObjec
 
 
 def naive_rest(log: Events, cut: int) -> Events:
-    """What follows an event."""
+    """Return the events after an event."""
     return Events(log.dof, {k: t[t["seq"] > cut] for k, t in log.tables.items()})
 
 
-def test_a_doctored_recording_is_found_out() -> None:
-    """Where planning again does not lead to what was recorded, the event is named."""
+def test_a_doctored_recording_is_refused() -> None:
+    """The message names the event at which planning again differs, and the versions."""
     recording, log = parent(plain("circles2d:n=20,seed=3", iterations=200, params={"step": 1.0}))
     tables = {kind: table.copy() for kind, table in log.tables.items()}
     tables[Kind.SAMPLE]["q"][7, 1] += 1e-9
@@ -212,8 +212,8 @@ def test_a_doctored_recording_is_found_out() -> None:
         BranchedRun(replace(doctored, manifest=other))
 
 
-def test_what_cannot_be() -> None:
-    """Each in one line that says what to do."""
+def test_refusals() -> None:
+    """Each message is one line and says what to do."""
     recording, log = parent(plain("circles2d:n=20,seed=3", iterations=5000))
     assert status(log) is Status.SOLVED
     last = last_open(log) + 1
@@ -245,7 +245,7 @@ def test_what_cannot_be() -> None:
 
 @pytest.mark.parametrize("name", ["circles2d-rrt", "circles2d-chain", "circles2d-rrt-star"])
 def test_golden_recordings(name: str, tmp_path: Path) -> None:
-    """A recording of old, of any robot, is gone on from; a file holds all of the branch."""
+    """Old recordings of any robot can be branched off; the file holds the whole branch."""
     recording = read(RECORDINGS / f"{name}.mcap")
     log = recording.events()
     iteration = last_open(log) // 2
@@ -262,7 +262,7 @@ def test_golden_recordings(name: str, tmp_path: Path) -> None:
 
 
 def test_damaged_manifests() -> None:
-    """A manifest that lies about its branches is one line, and so is one of a later format."""
+    """Damaged branches and later formats are refused in one line."""
     recording, _ = parent(plain("circles2d:n=20,seed=3", iterations=200, params={"step": 1.0}))
     texts = BranchedRun(recording, iteration=9).manifest.to_strings()
     lies = texts["branches"].replace('"events": ', '"events": -')
@@ -274,7 +274,7 @@ def test_damaged_manifests() -> None:
 
 
 def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
-    """`brrt plan --from`: the parent's events up to the branch, then the child's own."""
+    """`brrt plan --from` writes the parent's events up to the branch, then its own."""
     where = ("--world", "circles2d:n=20,seed=3", "--no-smooth")
     assert brrt("plan", *where, "--iterations", 40, "--out", "run.mcap").code == 1
     done = brrt("plan", "--from", "run.mcap", "--iterations", 5000, "--out", "more.mcap")
@@ -311,10 +311,10 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
         ("lrta-star", 9000, {"epsilon": 2.0, "trials": 2}),
     ],
 )
-def test_what_follows_planning_is_made_anew(
+def test_what_follows_planning_can_change(
     planner: str, iterations: int, params: dict[str, Any]
 ) -> None:
-    """Planning ends once more as it did; then the smoother has its own attempts."""
+    """Planning ends as it did; then the smoother has another number of attempts."""
     scenario = Scenario(
         world="circles2d:n=20,seed=3", planner=planner, params=params, iterations=iterations
     )
@@ -327,8 +327,8 @@ def test_what_follows_planning_is_made_anew(
         BranchedRun(recording)
 
 
-def test_a_run_goes_once() -> None:
-    """Its generator and its log have gone on, so a second time it would be another run."""
+def test_a_run_is_made_once() -> None:
+    """Its generator and its log have advanced, so a second run would differ."""
     run = Run(plain("circles2d:n=20,seed=3", iterations=50))
     run.execute([])
     with pytest.raises(BrrtError, match=r"made once; make another brrt\.Run\(scenario\)"):

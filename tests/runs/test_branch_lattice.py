@@ -1,4 +1,4 @@
-"""Searches on a lattice that go on from a recorded state with other settings."""
+"""Searches on a lattice that branch off a recorded one with other settings."""
 
 from dataclasses import replace
 from typing import Any
@@ -22,7 +22,7 @@ CAVE = Scenario(
 
 @st.composite
 def scenarios(draw: st.DrawFn) -> Scenario:
-    """Draw a search, on a lattice coarse enough to be over soon."""
+    """Draw a search on a coarse lattice, so that it ends soon."""
     planner = draw(st.sampled_from(["a-star", "lrta-star"]))
     params: dict[str, Any] = {
         "epsilon": draw(st.sampled_from([2.0, 3.3])),
@@ -43,7 +43,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 def test_without_a_change_it_is_the_parent(
     scenario: Scenario, data: st.DataObject, batch: int
 ) -> None:
-    """Wherever it branches the same events follow, smoothing included."""
+    """All events are the same, smoothing included."""
     recording, log = parent(scenario)
     iteration = data.draw(st.integers(0, last_open(log) - 1))
     _, again = child(recording, iteration=iteration, batch=batch)
@@ -52,10 +52,10 @@ def test_without_a_change_it_is_the_parent(
 
 @FEW
 @given(scenarios(), st.data(), st.sampled_from([1, 3, 12]), st.integers(1, 4))
-def test_a_change_holds_from_the_branch_on(
+def test_a_change_rules_from_the_branch_on(
     scenario: Scenario, data: st.DataObject, lookahead: int, trials: int
 ) -> None:
-    """Each stretch keeps its own promises, and all can be made again; a grandchild's too."""
+    """Each stretch keeps its contract, and the run is reproducible; so is a branch of a branch."""
     recording, log = parent(scenario)
     params = {"lookahead": lookahead, "trials": trials} if scenario.planner == "lrta-star" else {}
     how: dict[str, Any] = {"params": params, "settings": {"iterations": 900}}
@@ -77,7 +77,7 @@ def test_a_change_holds_from_the_branch_on(
 
 @pytest.mark.parametrize("planner", ["a-star", "lrta-star"])
 def test_a_failed_run_gets_more_iterations(planner: str) -> None:
-    """The run is the one that had them from the start."""
+    """It equals the run that had them from the start."""
     scenario = replace(CAVE, planner=planner, iterations=30)
     recording, log = parent(scenario)
     assert status(log) is Status.ITERATION_LIMIT
@@ -88,7 +88,7 @@ def test_a_failed_run_gets_more_iterations(planner: str) -> None:
 
 @pytest.mark.parametrize("lookahead", [1, 5])
 def test_more_trials(lookahead: int) -> None:
-    """A robot that arrived starts over with what it learnt, as if it had been told before."""
+    """A robot that arrived starts over with what it learnt, as with more trials from the start."""
     scenario = replace(CAVE, params={**CAVE.params, "lookahead": lookahead})
     recording, _ = parent(scenario)
     with pytest.raises(BrrtError, match=r"ended with its path at .*, or let it start over"):
@@ -101,7 +101,7 @@ def test_more_trials(lookahead: int) -> None:
 
 
 def test_another_lookahead_plans_anew() -> None:
-    """The moves that were planned with the old one are not made."""
+    """The moves that were planned with the old lookahead are not made."""
     scenario = replace(CAVE, params={**CAVE.params, "lookahead": 40})
     recording, log = parent(scenario)
     run, events = child(recording, iteration=2, params={"lookahead": 1})
@@ -113,8 +113,8 @@ def test_another_lookahead_plans_anew() -> None:
     assert check(short, recording.world, events) != []
 
 
-def test_what_cannot_be() -> None:
-    """What the lattice was laid by stays; a proof and an optimum are the end."""
+def test_refusals() -> None:
+    """The lattice cannot change; nothing follows an optimal path or a proof."""
     recording, _ = parent(CAVE)
     for name, value in {"epsilon": 1.0, "diagonals": True, "max_move": 9.0}.items():
         with pytest.raises(

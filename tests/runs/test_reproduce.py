@@ -1,4 +1,4 @@
-"""A recorded run planned again: equal wherever it was ended, and what was doctored is found."""
+"""Reproduced runs: equal however the recorded run ended; doctored events are found."""
 
 import os
 import re
@@ -50,7 +50,7 @@ def again(run: Run, batches: list[Events], **options: Any) -> Reproduction:
 
 @pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.mcap")), ids=lambda p: p.stem)
 def test_golden_recordings(path: Path) -> None:
-    """Each golden recording is planned again to the last bit."""
+    """Each golden recording is reproduced to the last bit."""
     recording = read(path)
     found = reproduce(recording)
     assert found.equal
@@ -62,8 +62,8 @@ def test_golden_recordings(path: Path) -> None:
 @pytest.mark.parametrize("name", PLANNERS)
 @settings(max_examples=12)
 @given(batch=st.integers(1, 60), stop=st.integers(0, 40))
-def test_a_run_that_somebody_ended(name: str, batch: int, stop: int) -> None:
-    """Ended after any batch, in whatever phase, it is planned again as far as that."""
+def test_an_interrupted_run(name: str, batch: int, stop: int) -> None:
+    """Interrupted after any batch, in any phase, it is reproduced up to there."""
     run = Run(PLANNERS[name], batch=batch)
     run.stop.interrupted = stop == 0
     batches = []
@@ -78,8 +78,8 @@ def test_a_run_that_somebody_ended(name: str, batch: int, stop: int) -> None:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_a_log_that_breaks_off(name: str) -> None:
-    """Of a run that was killed, all that there is is compared."""
+def test_a_cut_log(name: str) -> None:
+    """All events of a killed run are compared."""
     run, log = recorded(PLANNERS[name])
     for seq in np.linspace(0, len(log) - 2, 12).astype(int):
         found = again(run, split(log.until(seq=int(seq)), 50))
@@ -89,7 +89,7 @@ def test_a_log_that_breaks_off(name: str) -> None:
 
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_run_that_the_clock_ended(name: str) -> None:
-    """The clock ends planning; smoothing and driving follow, and all of it is planned again."""
+    """The clock ends planning; smoothing and execution follow, and all is reproduced."""
     scenario = replace(PLANNERS[name], goal=None, iterations=None, time=1e-9)
     run = Run(scenario)
     batches = list(run.events())
@@ -101,7 +101,7 @@ def test_a_run_that_the_clock_ended(name: str) -> None:
 
 
 def test_a_clock_that_lets_a_path_be_found() -> None:
-    """RRT* has a path when its time is over, beyond the iterations that it has by default."""
+    """RRT* has a path when its time is over, after more iterations than its default."""
     scenario = replace(PLANNERS["rrt-star"], iterations=None, time=0.15)
     run = Run(scenario)
     batches = list(run.events())
@@ -111,7 +111,7 @@ def test_a_clock_that_lets_a_path_be_found() -> None:
 
 
 def doctored(log: Events, kind: Kind, name: str, change: Callable[[Any], Any]) -> Events:
-    """Return a log in which a field of the middle event of a kind is another."""
+    """Return a log in which a field of the middle event of a kind differs."""
     table = log[kind].copy()
     table[name][len(table) // 2] = change(table[name][len(table) // 2])
     return Events(log.dof, {**log.tables, kind: table})
@@ -122,7 +122,7 @@ def doctored(log: Events, kind: Kind, name: str, change: Callable[[Any], Any]) -
     [(Kind.SAMPLE, "q"), (Kind.EDGE, "cost"), (Kind.REJECT, "node"), (Kind.PATH, "cost")],
 )
 def test_what_was_doctored_is_found(kind: Kind, name: str) -> None:
-    """One number is another one: that event is named."""
+    """The event with the changed number is the first difference."""
     run, log = recorded(PLAIN)
     other = doctored(log, kind, name, lambda value: value + 1)
     found = again(run, [other])
@@ -133,8 +133,8 @@ def test_what_was_doctored_is_found(kind: Kind, name: str) -> None:
     assert any(line.startswith("recorded") for line in found.lines())
 
 
-def test_rounding_passes_and_is_told() -> None:
-    """Numbers that are a rounding apart pass; how far and where is told. Integers never do."""
+def test_rounding_passes_and_is_reported() -> None:
+    """Numbers may differ by rounding; the greatest deviation is reported. Integers may not."""
     run, log = recorded(PLAIN)
     other = doctored(log, Kind.EDGE, "cost", lambda value: value * (1 + 1e-12))
     found = again(run, [other])
@@ -147,8 +147,8 @@ def test_rounding_passes_and_is_told() -> None:
     assert not again(run, [other], tolerance=1e-13).equal
 
 
-def test_a_missing_phase_is_only_somebodys_doing() -> None:
-    """A log without its smoothing passes; one that goes on too long does not."""
+def test_a_missing_phase_is_an_interruption() -> None:
+    """A log without its smoothing passes; one with more events than the run does not."""
     run, log = recorded(replace(PLAIN, execute=False))
     smoothing = int(log[Kind.PHASE]["seq"][2])
     found = again(run, [log.until(seq=smoothing - 1)])
@@ -158,8 +158,8 @@ def test_a_missing_phase_is_only_somebodys_doing() -> None:
     assert not again(shorter, [log]).equal
 
 
-def test_other_versions_are_told() -> None:
-    """What was made elsewhere is named, and is no difference."""
+def test_other_versions_are_reported() -> None:
+    """They are no difference of the runs."""
     run, log = recorded(PLAIN)
     manifest = replace(run.manifest, made_by={**run.manifest.made_by, "numpy": "1.0"})
     found = reproduce(Recording(manifest, run.problem.world, lambda: [log]))
@@ -169,7 +169,7 @@ def test_other_versions_are_told() -> None:
 
 
 def foreign(folder: Path) -> Path:
-    """Write a recording of a planner that is not known here."""
+    """Write a recording of a planner that is not registered."""
     run, log = recorded(PLAIN)
     scenario = replace(run.manifest.scenario, planner="somebodys", params={})
     sink = McapSink(folder / "foreign.mcap", replace(run.manifest, scenario=scenario),
@@ -180,7 +180,7 @@ def foreign(folder: Path) -> Path:
 
 
 def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
-    """World and robot files are gone, and the folder is another; JSON and exit codes."""
+    """The files of world and robot are not needed; JSON and exit codes."""
     (tmp_path / "there").mkdir()
     os.chdir(tmp_path / "there")
     World("mine", np.zeros(2), np.full(2, 10.0), balls=np.array([[5, 5, 1]])).save("mine.json")
@@ -203,7 +203,7 @@ def test_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
 
 
 def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: Path) -> None:
-    """A sample elsewhere breaks no rule; planning again finds it."""
+    """A moved sample breaks no rule, but the reproduced run differs."""
     run, log = recorded(replace(PLAIN, clock="logical"))
     other = doctored(log, Kind.SAMPLE, "q", lambda q: q * 0.999)
     sink = McapSink(tmp_path / "run.mcap", run.manifest, run.problem.world)
@@ -215,7 +215,7 @@ def test_doctored_file_fails_the_command(brrt: Callable[..., Result], tmp_path: 
 
 
 def test_a_stop_beyond_the_default() -> None:
-    """A run that made more iterations in its time than it makes by default ends where it did."""
+    """A run that made more iterations in its time than its default is reproduced in full."""
     scenario = replace(PLAIN, time=5.0)
     stop = make_stop(stopped_at(scenario, 3_000_000))
     assert stop.draws == 3_000_000
@@ -223,8 +223,8 @@ def test_a_stop_beyond_the_default() -> None:
     assert stop.time_s is None
 
 
-def test_planners_that_are_not_known(tmp_path: Path) -> None:
-    """From Python it is an error as well."""
+def test_planners_that_are_not_registered(tmp_path: Path) -> None:
+    """Their runs cannot be reproduced."""
     recording = read(foreign(tmp_path))
     with pytest.raises(BrrtError, match="somebodys is not registered"):
         reproduce(recording)

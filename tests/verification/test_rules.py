@@ -99,6 +99,12 @@ class Evidence:
             manifest=replace(self.manifest, scenario=replace(self.manifest.scenario, **changed)),
         )
 
+    def state_contract(self, **fields: Any) -> "Evidence":
+        """Change the contract that the manifest states."""
+        assert self.manifest.contract is not None
+        contract = replace(self.manifest.contract, **fields)
+        return replace(self, manifest=replace(self.manifest, contract=contract))
+
 
 @cache
 def evidence(name: str) -> Evidence:
@@ -312,6 +318,8 @@ DOCTORED: list[tuple[str, str, Callable[[Evidence], Evidence], set[str]]] = [
     ("figures", "rrt-star", lambda c: c.state("solved", False), set()),
     ("figures", "lrta-star", lambda c: c.state("moves", 7), set()),
     ("figures", "a-star", lambda c: c.state("path", [[0.0, 0.0]]), set()),
+    ("contract", "rrt", lambda c: c.state_contract(stops=None), set()),
+    ("contract", "rrt-star", lambda c: c.state_contract(draws=None), set()),
     ("outcome", "rrt", lambda c: c.edit(Kind.PHASE, 1, status=Status.ITERATION_LIMIT),
      {"endings"}),
     ("outcome", "march", lambda c: c.drop(Kind.PATH, 0), {"moves along path"}),

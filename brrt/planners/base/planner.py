@@ -1,4 +1,4 @@
-"""What every planner is: settings with one method."""
+"""The base class of planners: settings with the method `solve`."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -47,11 +47,11 @@ class Planner(Settings):
     def solve(
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
-        """Yield batches of events until solved or stopped; the log is the only output.
+        """Plan until solved or stopped; yield the events in batches, the only output.
 
         Args:
             problem: Robot, world, start and goal.
-            rng: Every random draw comes from here.
+            rng: Source of all random draws.
             log: Numbers and times the events.
             stop: Budget and interruption.
         """

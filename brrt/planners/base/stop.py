@@ -1,4 +1,4 @@
-"""When to stop, as a value that the caller passes."""
+"""When to stop: a value that the caller passes to a planner."""
 
 import math
 import time
@@ -12,12 +12,12 @@ _BRIEF_S, _LONG_S, _MOST_SHARE = 0.1, 0.4, 1 << 40
 
 @dataclass(slots=True)
 class Stop:
-    """A budget and a flag that anyone may raise while a planner runs.
+    """A budget, and a flag that may be set while a planner runs.
 
     Attributes:
-        iterations: Iterations that a planner may count.
-        draws: Draws that it may make, whether they count or not; None for no limit.
-        time_s: Seconds it may take; None for no limit, and then no event depends on the clock.
+        iterations: Limit of the iterations that count.
+        draws: Limit of all draws; None for no limit.
+        time_s: Limit in seconds; None for no limit, so that no event depends on the clock.
         interrupted: Set it to stop the run at the next batch.
         signal: Number of the signal that set it; 0 if none did.
     """
@@ -31,7 +31,7 @@ class Stop:
     _asked: float = field(default=math.inf, init=False, repr=False, compare=False)
 
     def reached(self, iterations: int, elapsed_s: float) -> Status | None:
-        """Say why to stop, or None to go on."""
+        """Return why to stop, or None to continue."""
         if self.interrupted:
             return Status.INTERRUPTED
         if iterations >= self.iterations:
@@ -41,9 +41,9 @@ class Stop:
         return None
 
     def share(self, iterations: int) -> int:
-        """Iterations until the next look at the clock and at `interrupted`: a tenth of a second.
+        """Return iterations until the next check of clock and flag: about a tenth of a second.
 
-        Where time is limited they are few. No event depends on how a run is divided.
+        With a limit of time they are few. No event depends on how a run is divided.
         """
         now = time.monotonic()
         passed, self._asked = now - self._asked, now

@@ -1,4 +1,4 @@
-"""The real-time mode: the robot drives the path in moves of bounded length."""
+"""The real-time mode: the robot follows the path in moves of bounded length."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,25 +16,25 @@ from brrt.settings import Settings, param
 
 @dataclass(frozen=True, slots=True)
 class Execute(Settings):
-    """Cut each motion of a path into the fewest equal moves that are no longer than `max_move`.
+    """Cut each motion of a path into the fewest equal moves of at most `max_move`.
 
-    Nobody waits: a move says when it was decided, and its planning time is the time since the one
-    before. So a tree planner's first move carries all of its planning, while the robot stays put.
+    Nothing is delayed: the time of a move is that of its decision, and its planning time is the
+    time since the move before. So the first move after a tree planner has all of its planning time.
     """
 
     max_move: float = param(1.0, "longest move, in the robot's metric", above=0)
 
-    def drive(
+    def follow(
         self, path: NDArray[np.float64], space: Any, log: EventLog, stop: Stop, iteration: int
     ) -> Iterator[Events]:
-        """Yield batches of events, among them each move.
+        """Yield the moves along a path, in batches of events.
 
         Args:
             path: Waypoints, shape (n, dof), n at least 1.
             space: Configuration space, as kernels see it.
             log: Numbers and times the events.
-            stop: Interruption.
-            iteration: The planner's count, for the events.
+            stop: Interruption; its budget is not used.
+            iteration: The planner's last iteration, for the events.
         """
         if log.room < 2:
             yield log.drain()

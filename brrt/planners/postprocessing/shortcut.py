@@ -1,4 +1,4 @@
-"""Shortcut smoothing (Geraerts and Overmars 2007): random pairs, joined directly where free."""
+"""Shortcut smoothing (Geraerts and Overmars 2007)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from brrt.settings import Settings, param
 
 @dataclass(frozen=True, slots=True)
 class Shortcut(Settings):
-    """Pick two waypoints at random; replace what lies between by a direct motion if it is free.
+    """Pick two waypoints at random; replace those between by a direct motion if it is free.
 
     The cost never rises and the ends never move.
     """
@@ -33,15 +33,15 @@ class Shortcut(Settings):
         stop: Stop,
         iteration: int,
     ) -> Iterator[Events]:
-        """Yield batches of events; the last but one event is the smoothed path.
+        """Yield batches of events; the last event but one is the smoothed path.
 
         Args:
             path: Waypoints, shape (n, dof), n at least 1.
             space: Configuration space, as kernels see it.
-            rng: Every random draw comes from here.
+            rng: Source of all random draws.
             log: Numbers and times the events.
-            stop: Interruption; the planner's budget does not count here.
-            iteration: The planner's count, for the events.
+            stop: Interruption; its budget is not used.
+            iteration: The planner's last iteration, for the events.
         """
         if log.room < 3:
             yield log.drain()

@@ -1,4 +1,4 @@
-"""Start and goal that the seed decides."""
+"""Random starts and goals."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +20,7 @@ ROBOTS = {
 
 
 def scenario(robot: str, seed: int = 0) -> Scenario:
-    """Start and goal at random."""
+    """Return a scenario with a random start and goal."""
     return Scenario(
         world=ROBOTS[robot], robot=robot.partition(" in ")[0], planner="rrt-connect", seed=seed,
         start="random", goal="random", iterations=500,
@@ -28,8 +28,8 @@ def scenario(robot: str, seed: int = 0) -> Scenario:
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_both_are_free_and_the_seed_decides(robot: str) -> None:
-    """The same seed gives the same query; ten seeds give ten of each, all of them free."""
+def test_both_are_free_and_determined_by_the_seed(robot: str) -> None:
+    """The same seed gives the same query; ten seeds give ten free starts and goals."""
     drawn = []
     for seed in range(10):
         problem, again = (Problem.of(scenario(robot, seed)) for _ in range(2))
@@ -41,7 +41,7 @@ def test_both_are_free_and_the_seed_decides(robot: str) -> None:
 
 
 def test_they_spread_evenly() -> None:
-    """In an empty world the draws fill each quarter of the map alike."""
+    """In an empty world each quarter of the map gets as many draws."""
     base = Scenario(world="circles2d:n=0", start="random")
     world = Problem.of(base).world
     many = [Problem.of(replace(base, seed=seed), world).start > 50 for seed in range(400)]
@@ -49,8 +49,8 @@ def test_they_spread_evenly() -> None:
     assert np.bincount(quarters, minlength=4).min() > 70
 
 
-def test_each_has_a_stream_of_its_own() -> None:
-    """Neither moves the other, the world, or what the planner draws."""
+def test_each_has_its_own_generator() -> None:
+    """Neither affects the other, the world, or the planner's draws."""
     both = Problem.of(scenario("point"))
     start, goal = tuple(both.start.tolist()), tuple(both.goal.tolist())
     one = replace(scenario("point"), goal=goal)
@@ -72,8 +72,8 @@ def test_each_has_a_stream_of_its_own() -> None:
     assert samples[0] == samples[1]
 
 
-def test_a_recording_holds_what_was_drawn(brrt: Callable[..., Result]) -> None:
-    """By option or by file; the manifest's scenario plans it again, and its checks hold."""
+def test_a_recording_has_the_drawn_query(brrt: Callable[..., Result]) -> None:
+    """By option or by file; the manifest's scenario plans it again, and all rules hold."""
     done = brrt("plan", "--start", "random", "--goal", "random", "--seed", 5, "--out", "a.mcap",
                 "--json")  # fmt: skip
     assert done.code == 0, done.err
@@ -85,8 +85,8 @@ def test_a_recording_holds_what_was_drawn(brrt: Callable[..., Result]) -> None:
     assert brrt("replay", "a.mcap", "--check", "b.mcap").code == 0
 
 
-def test_checks_hold() -> None:
-    """Of every robot's run."""
+def test_rules_hold() -> None:
+    """All rules hold for a run of each robot."""
     for robot in ROBOTS:
         run, memory = Run(scenario(robot)), Memory()
         run.execute([memory])
@@ -96,7 +96,7 @@ def test_checks_hold() -> None:
 
 
 def test_no_room_is_one_line() -> None:
-    """A robot that fits nowhere is told so."""
+    """A robot that fits nowhere is refused."""
     full = Scenario(
         world="circles2d:n=0",
         robot="polygon:length=99.9,width=99.9",
@@ -110,7 +110,7 @@ def test_no_room_is_one_line() -> None:
 
 
 def test_a_chain_keeps_its_base_free() -> None:
-    """Obstacles would otherwise stand on it for good, whatever is drawn."""
+    """An obstacle at the base would block every configuration."""
     robot = make_robot("chain:base_x=20,base_y=20")
     for seed in range(5):
         problem = Problem.of(
