@@ -1,4 +1,4 @@
-"""The errors that brrt raises on purpose."""
+"""Errors that brrt raises for bad input and unusable files."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -9,32 +9,36 @@ class BrrtError(Exception):
 
 
 class RecordingError(BrrtError):
-    """A recording cannot be written, or cannot be read in whole."""
+    """A recording cannot be written, or cannot be read completely."""
 
 
 class WriteError(RecordingError):
-    """A recording cannot be written, or not to its end.
+    """A recording cannot be written, or writing it failed part-way.
 
     Args:
         path: The file.
-        reason: What the system says of it.
-        left: What there is of the file all the same; nothing by default.
+        reason: The operating system's message.
+        left: What the file contains after all; empty if it does not exist.
     """
 
     def __init__(self, path: object, reason: str, left: str = "") -> None:
-        how = f"cannot go on writing {path}: {reason}; {left}"
-        super().__init__(how if left else f"cannot write {path}: {reason}")
+        if left:
+            super().__init__(f"writing {path} failed: {reason}; {left}")
+        else:
+            super().__init__(f"cannot write {path}: {reason}")
         self.reason = reason
 
 
 class LogError(RecordingError):
-    """The events of a recording contradict each other, so that there is nothing to tell of it."""
+    """The events of a recording contradict each other."""
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> BrrtError:
-    """Return the error for `name`, which is none of the `known` names of a `what`."""
+    """Return the error for a name that is not among the `known` names of a `what`."""
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
-    there = "there is: " + ", ".join(names) if names else "there is none"
-    hint = f"did you mean {near[0]!r}?" if near else there
+    if near:
+        hint = f"did you mean {near[0]!r}?"
+    else:
+        hint = f"choose from: {', '.join(names)}" if names else f"there is no {what}"
     return BrrtError(f"unknown {what} {name!r}; {hint}")

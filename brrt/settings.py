@@ -1,8 +1,8 @@
-"""Settings that check themselves: the base of planners, robots, smoothers and generators.
+"""Settings: checked parameters of planners, robots, smoothers, world generators and loaders.
 
-A setting is a field of a frozen dataclass, declared with `param`, which holds its range, unit and
-meaning. The same declaration serves Python (`RRT(step=2)`), the command line (`--param step=2`),
-the help texts and the manifest.
+A setting is a field of a frozen dataclass, declared with `param`, which states its range, unit and
+meaning. The declaration serves Python (`RRT(step=2)`), the command line (`--param step=2`), the
+help texts and the manifest.
 """
 
 import math
@@ -24,7 +24,10 @@ def param(
     high: float | None = None,
     unit: str = "",
 ) -> Any:
-    """Declare a setting with its default, meaning and range (`low` included, `above` excluded)."""
+    """Declare a setting: its default, its meaning, and its range from `low` or `above` to `high`.
+
+    `low` and `high` are within the range, `above` is not.
+    """
     return field(
         default=default,
         metadata={"doc": doc, "low": low, "above": above, "high": high, "unit": unit},
@@ -33,7 +36,7 @@ def param(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Base class; its subclasses are frozen dataclasses whose fields are declared by `param`."""
+    """Base class of frozen dataclasses whose fields are declared by `param`."""
 
     def __post_init__(self) -> None:
         """Check every value against its declaration.
@@ -49,14 +52,14 @@ class Settings:
 
     @classmethod
     def parse(cls, owner: str, values: Mapping[str, Any]) -> Self:
-        """Make settings from named values, texts allowed.
+        """Make settings from named values, which may be strings.
 
         Args:
             owner: What they configure, for messages ("planner rrt").
             values: Names and values, as from TOML, JSON or the command line.
 
         Raises:
-            BrrtError: A name is not known, or a value is of no use.
+            BrrtError: A name is unknown, or a value has the wrong type or is out of range.
         """
         names = [f.name for f in _params(cls)]
         for name in values:
@@ -66,7 +69,7 @@ class Settings:
         return cls(**{name: _typed(name, value, hints[name]) for name, value in values.items()})
 
     def as_dict(self) -> dict[str, Any]:
-        """Names and values, as `parse` takes them."""
+        """Return names and values, as `parse` takes them."""
         return {f.name: getattr(self, f.name) for f in _params(self)}
 
     @classmethod
@@ -77,7 +80,7 @@ class Settings:
 
     @classmethod
     def describe(cls) -> list[dict[str, str]]:
-        """One row a setting, for tables: name, default, unit, range, doc."""
+        """Return one row for each setting: name, default, unit, range, doc."""
         hints = get_type_hints(cls)
         return [
             {
@@ -91,11 +94,15 @@ class Settings:
         ]
 
 
-def pairs(owner: str, text: str) -> dict[str, str]:
+def parse_pairs(owner: str, text: str) -> dict[str, str]:
     """Split `a=1,b=2` into names and values.
 
+    Args:
+        owner: What they configure, for messages.
+        text: The pairs.
+
     Raises:
-        BrrtError: A part is no pair.
+        BrrtError: A part is not `name=value`, or a name is repeated.
     """
     found: dict[str, str] = {}
     for part in filter(None, text.split(",")):
@@ -103,13 +110,13 @@ def pairs(owner: str, text: str) -> dict[str, str]:
         if not equals:
             raise BrrtError(f"{owner}: {part!r} must read name=value")
         if name.strip() in found:
-            raise BrrtError(f"{owner}: {name.strip()} is given twice; leave one of them out")
+            raise BrrtError(f"{owner}: {name.strip()} is given twice; give it once")
         found[name.strip()] = value.strip()
     return found
 
 
 def _params(settings: Any) -> list[Field[Any]]:
-    """Return the fields that were declared by `param`: a class may have others besides."""
+    """Return the fields that are declared by `param`; a class may have other fields."""
     return [f for f in fields(settings) if "doc" in f.metadata]
 
 
@@ -135,7 +142,7 @@ def _range_text(meta: Mapping[str, Any], hint: Any) -> str:
 
 
 def _typed(name: str, value: Any, hint: Any) -> Any:
-    """Bring `value` to the type of `hint`, or say what is wrong with it."""
+    """Convert `value` to the type of `hint`."""
     if type(None) in get_args(hint):
         if value is None or value in ("auto", ""):
             return None
@@ -154,7 +161,7 @@ def _typed(name: str, value: Any, hint: Any) -> Any:
 def _as_number(name: str, value: Any, hint: Any) -> Any:
     try:
         if isinstance(value, bool):
-            raise TypeError  # noqa: TRY301 - a truth value is no number
+            raise TypeError  # noqa: TRY301 - bool is a subclass of int
         number = hint(float(value)) if hint is int and _is_scientific(value) else hint(value)
     except (TypeError, ValueError, OverflowError):
         kind = "a whole number" if hint is int else "a number"

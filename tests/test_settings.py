@@ -117,7 +117,7 @@ def test_errors_name_the_setting_and_the_value(name: str, given: Any, message: s
     [
         ("cuont", "did you mean 'count'?"),
         ("Size", "did you mean 'size'?"),
-        ("zzz", "there is: count, keep, mode, part, range, size"),
+        ("zzz", "choose from: count, keep, mode, part, range, size"),
     ],
 )
 def test_unknown_names(name: str, hint: str) -> None:

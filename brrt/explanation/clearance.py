@@ -11,7 +11,7 @@ from brrt.explanation.summary import RunSummary
 from brrt.robots import Polygon, Robot
 from brrt.worlds.convex import inscribed
 from brrt.worlds.free_space import connected
-from brrt.worlds.narrow_passage import Passage, narrowest, widest
+from brrt.worlds.narrow_passage import Passage, max_width, narrowest_passage
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -105,7 +105,7 @@ class ClearanceSearch:
         if self._robot.configuration(self._world.lower) is None:
             return Clearance(None, "not computed: this robot has no position in the world")
         ends = self._points(np.stack([start, goal]))
-        found = narrowest(self._world, *ends)
+        found = narrowest_passage(self._world, *ends)
         if found is not None:
             narrow = self._narrow(found, step)
             bound = self._widest(ends) if found.low < self._body else None
@@ -129,7 +129,7 @@ class ClearanceSearch:
         for cells in _PROOF:
             side = self._world.extent / cells ** (1 / self._world.dim)
             enough = max(self._body, 8 * side)
-            best = min(best, widest(self._world, ends[0], ends[1], cells, enough))
+            best = min(best, max_width(self._world, ends[0], ends[1], cells, enough))
             if best < self._body or best == 0:
                 break
         return best if np.isfinite(best) else None
@@ -147,23 +147,23 @@ class ClearanceSearch:
         """Compare the run with the narrowest place."""
         summary, behind, through = self._summary, 0, None
         for tree in summary.trees[:1]:
-            passed = found.passed(self._points(summary.nodes(tree)))
+            passed = found.is_beyond(self._points(summary.nodes(tree)))
             behind = int(passed.sum())
             through = int(summary.iterations(tree)[passed][0]) if behind else None
         q = [summary.nodes(tree) for tree in summary.trees] or [summary.cells.q]
         if not summary.trees:
-            behind = int(found.passed(self._points(q[0])).sum())
+            behind = int(found.is_beyond(self._points(q[0])).sum())
         reach = max(float(coarse(self._world).cell.max()), step or 0.0)
-        near = int((found.apart(self._points(np.concatenate(q))) <= reach).sum())
+        near = int((found.distance(self._points(np.concatenate(q))) <= reach).sum())
         path, crossed = summary.metrics.best_path, None
         if path is not None:
             way = self._points(self._robot.along(path[1], _ALONG))
-            crossed = bool(found.apart(way).min() <= found.high / 2 + found.cell)
+            crossed = bool(found.distance(way).min() <= found.high / 2 + found.cell)
         return Narrow(
             low=found.low,
             high=found.high,
             q=found.place.tolist(),
-            parts=bool(found.behind.any()),
+            parts=bool(found.beyond.any()),
             behind=behind,
             through=through,
             near=near,

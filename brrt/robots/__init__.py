@@ -10,7 +10,7 @@ from brrt.robots.chain import Chain
 from brrt.robots.point import Point
 from brrt.robots.polygon import Polygon
 from brrt.robots.robot import SCHEMA, VERSION, Robot
-from brrt.settings import pairs
+from brrt.settings import parse_pairs
 
 ROBOTS: Mapping[str, type[Robot]] = {"point": Point, "polygon": Polygon, "chain": Chain}
 
@@ -31,7 +31,7 @@ def make_robot(spec: str) -> Robot:
     name, _, rest = spec.partition(":")
     if name not in ROBOTS:
         raise unknown("robot", name, ROBOTS)
-    return ROBOTS[name].parse(f"robot {name}", pairs(f"robot {spec}", rest))
+    return ROBOTS[name].parse(f"robot {name}", parse_pairs(f"robot {spec}", rest))
 
 
 def names_robot_file(spec: str) -> bool:

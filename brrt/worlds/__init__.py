@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError, unknown
 from brrt.files import is_file, is_there, read_bytes
 from brrt.registry import Registry
-from brrt.settings import pairs
+from brrt.settings import parse_pairs
 from brrt.worlds.file_spec import FileSpec
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
@@ -102,13 +102,13 @@ def make_world(
     """
     name, _, rest = spec.partition(":")
     if name in GENERATORS:
-        generator = GENERATORS[name].parse(f"world {name}", pairs(f"world {spec}", rest))
+        generator = GENERATORS[name].parse(f"world {name}", parse_pairs(f"world {spec}", rest))
         return generator.make(spec, start, goal, room)
     path, params, query = FileSpec.parse(spec)
     if not spec:
         raise unknown("world", spec, GENERATORS)
     if is_there(path) or _loaders_for(path):
-        world = load_world(path, pairs(f"world {spec}", params), query)
+        world = load_world(path, parse_pairs(f"world {spec}", params), query)
         return replace(world, name=spec) if params or query else world
     if "/" in str(path) or path.suffix:
         raise BrrtError(f"{path}: no such file")

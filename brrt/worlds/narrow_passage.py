@@ -1,7 +1,7 @@
-"""The narrowest place on the widest way from start to goal, for a point: a fold over cells.
+"""The narrowest passage on the widest path from start to goal, for a point, by rasters of cells.
 
-Clearance is measured from cell to cell, so widths are known to about two cells; finer cells are
-taken until that is little, or there are no finer ones.
+Clearance is measured from cell to cell, so that widths are known to about two cells; the rasters
+get finer until that is a small part of the width.
 """
 
 import itertools
@@ -11,175 +11,175 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brrt.worlds.arrays import Bools, Floats, Ints
 from brrt.worlds.free_space import grid_only, nearest_free_cell
-from brrt.worlds.obstacle_arrays import Bools, Floats, Ints, obstacle_arrays
+from brrt.worlds.obstacle_arrays import obstacle_arrays
 from brrt.worlds.rasterize import Raster, components
 from brrt.worlds.world import World
 
 Cell = tuple[int, ...]
 
 CELLS = (1 << 12, 1 << 16, 1 << 18, 1 << 20)
-"""Cells of the lattices, each finer than the one before."""
+"""Cells of the rasters, from coarse to fine."""
 
 _ENOUGH = 12
-"""Cells across a passage that is measured well enough."""
+"""A passage that many cells wide is measured well enough."""
 
 _WIDE = 0.05
-"""Part of the map's longest side that is no narrow place: it need not be measured any better."""
+"""A passage wider than this part of the world's longest side is not narrow; no finer raster."""
 
 _FARTHEST = 32
-"""Clearances beyond so many cells are taken to be that."""
+"""Largest clearance that is distinguished, in cells."""
 
 _THIN = 64
-"""Cells of a neck that points are compared with."""
+"""Maximum number of bottleneck cells that distances are measured to."""
 
-_SURE = 1 + 1e-6
-"""Makes up for cells that an obstacle only nearly touches, and for rounding."""
+_ENLARGED = 1 + 1e-6
+"""Factor that makes up for rounding, and for cells that an obstacle only nearly touches."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Passage:
-    """The narrowest place on the widest way.
+    """The narrowest passage on the widest path from start to goal.
 
-    A way is as wide as twice the least clearance on it, to obstacles and bounds; where it begins
-    and ends does not count: both are taken to the roomiest place that clearance rises to from
-    there.
+    A path is as wide as twice its least clearance to obstacles and bounds. Its ends do not count:
+    they are moved to the local maximum of clearance that is reached by climbing from start and
+    goal.
 
     Attributes:
-        low: The passage is about that wide at least.
-        high: And at most.
-        place: Its middle, shape (d,).
-        cell: Side of the cells that it was measured with.
-        lattice: These.
-        behind: Which of these lie behind it, as one comes from the start, as far as they have more
-            clearance; none where no narrow place parts start and goal.
-        neck: Middles of the cells without room to spare in a row about the place, shape (k, d).
+        low: Lower estimate of the width.
+        high: Upper estimate.
+        place: Middle of the passage, shape (d,).
+        cell: Longest side of the cells that it was measured with.
+        raster: These cells.
+        beyond: Which of the cells lie beyond the passage as seen from the start, of those with more
+            clearance; none where no narrow passage separates start and goal.
+        bottleneck: Middles of the consecutive cells with the least clearance, shape (k, d).
     """
 
     low: float
     high: float
     place: Floats
     cell: float
-    lattice: Raster
-    behind: Bools
-    neck: Floats
+    raster: Raster
+    beyond: Bools
+    bottleneck: Floats
 
-    def passed(self, points: Floats) -> Bools:
-        """Whether each point, shape (n, d), lies in a cell behind the passage."""
-        return np.asarray(self.behind[tuple(self.lattice.index(points).T)])
+    def is_beyond(self, points: Floats) -> Bools:
+        """Whether each point, shape (n, d), lies in a cell beyond the passage."""
+        return np.asarray(self.beyond[tuple(self.raster.index(points).T)])
 
-    def apart(self, points: Floats) -> Floats:
-        """How far each point, shape (n, d), is from the neck, shape (n,)."""
-        thin = self.neck[:: len(self.neck) // _THIN + 1]
+    def distance(self, points: Floats) -> Floats:
+        """Return the distance of each point, shape (n, d), from the bottleneck, shape (n,)."""
         square = np.full(len(points), np.inf)
-        for middle in thin:
+        for middle in self.bottleneck[:: len(self.bottleneck) // _THIN + 1]:
             np.minimum(square, ((points - middle) ** 2).sum(axis=1), out=square)
         return np.asarray(np.sqrt(square))
 
 
-def narrowest(world: World, start: Floats, goal: Floats) -> Passage | None:
-    """Find the narrowest place on the widest way; None where cells of no size show a way.
+def narrowest_passage(world: World, start: Floats, goal: Floats) -> Passage | None:
+    """Find the narrowest passage on the widest path; None if no raster shows a path.
 
     Args:
         world: The world.
-        start: Where the way begins, shape (d,).
-        goal: Where it ends.
+        start: Shape (d,).
+        goal: Shape (d,).
     """
     found, most = None, np.inf
-    for lattice, free, ends in _lattices(world, start, goal):
-        size = float(lattice.cell.max())
+    for raster, free, ends in _rasters(world, start, goal):
+        size = float(raster.cell.max())
         label = None if ends is None else components(free)
         if ends is None or label is None or label[ends[0]] != label[ends[1]] or label[ends[0]] < 0:
-            # What lets no cell through is narrower than a few of them, whichever way it runs.
+            # A passage in any direction without a chain of free cells is at most a few cells wide.
             most = 4 * size
             continue
         farthest = int(min(_FARTHEST, 0.5 * most / size + 2))
-        found = _measured(lattice, free, ends, farthest)
+        found = _measure(raster, free, ends, farthest)
         most = found.high
         if found.high >= _ENOUGH * size or found.low >= _WIDE * world.extent:
             break
     return found
 
 
-def _lattices(
+def _rasters(
     world: World, start: Floats, goal: Floats
 ) -> Iterator[tuple[Raster, Bools, tuple[Cell, Cell] | None]]:
-    """Yield lattices, which of their cells are free, and the cells of start and goal if free."""
+    """Yield rasters, which of their cells are free, and the cells of start and goal if free."""
     grid = grid_only(world)
     if grid is not None and grid.yaw == 0 and grid.cells.size <= 2 * CELLS[-1]:
-        # A map is measured by its own cells: their borders are where its obstacles end.
-        lattice = Raster(grid.origin, np.full(2, grid.resolution), grid.cells.shape[::-1])
-        here, there = (tuple(lattice.index(end).tolist()) for end in (start, goal))
-        yield lattice, ~grid.cells.T, (here, there)
+        # A grid is measured by its own cells: obstacles end at their sides.
+        raster = Raster(grid.origin, np.full(2, grid.resolution), grid.cells.shape[::-1])
+        here, there = (tuple(raster.index(end).tolist()) for end in (start, goal))
+        yield raster, ~grid.cells.T, (here, there)
         return
     obstacles = obstacle_arrays(world.without_grid())
     for cells in CELLS:
-        lattice = Raster.over(world.lower, world.upper, cells)
-        free = ~lattice.blocked(obstacles)
-        one, other = (nearest_free_cell(lattice, free, obstacles, end) for end in (start, goal))
-        yield lattice, free, None if one is None or other is None else (one, other)
+        raster = Raster.over(world.lower, world.upper, cells)
+        free = ~raster.blocked(obstacles)
+        one, other = (nearest_free_cell(raster, free, obstacles, end) for end in (start, goal))
+        yield raster, free, None if one is None or other is None else (one, other)
 
 
-def _measured(lattice: Raster, free: Bools, ends: tuple[Cell, Cell], farthest: int) -> Passage:
-    """Measure the narrowest place among cells that lead from one end to the other."""
-    size = float(lattice.cell.max())
-    square = clearance(free, lattice.cell, farthest)
-    start, goal = (_roomiest(square, end) for end in ends)
+def _measure(raster: Raster, free: Bools, ends: tuple[Cell, Cell], farthest: int) -> Passage:
+    """Measure the narrowest passage on the widest path of free cells between two cells."""
+    size = float(raster.cell.max())
+    square = clearance(free, raster.cell, farthest)
+    start, goal = (_climb(square, end) for end in ends)
     least, label = _bottleneck(square, start, goal)
     beyond = np.zeros(free.shape, np.bool_)
     if label[start] >= 0 and label[goal] >= 0:
         beyond = label == label[goal]
-        row = _neck(square >= least, label, start, goal)
-    else:  # one of the ends itself is where there is least room
+        row = _bottleneck_cells(square >= least, label, start, goal)
+    else:  # one of the ends has the least clearance
         row = np.array([start if square[start] <= square[goal] else goal])
     width = 2 * float(np.sqrt(least))
-    neck = np.mean(lattice.corners(row), axis=0)
-    place = neck[len(neck) // 2]
-    return Passage(width - size, width + 2 * size, place, size, lattice, beyond, neck)
+    middles = np.mean(raster.corners(row), axis=0)
+    place = middles[len(middles) // 2]
+    return Passage(width - size, width + 2 * size, place, size, raster, beyond, middles)
 
 
-def widest(world: World, start: Floats, goal: Floats, cells: int, enough: float) -> float:
-    """Prove how wide a disc, or a ball, can be at most that gets from start to goal.
+def max_width(world: World, start: Floats, goal: Floats, cells: int, enough: float) -> float:
+    """Bound the diameter of a disc or ball that can move from start to goal, by proof.
 
-    No point of a cell has more room than there is from its middle to that of a cell with some of
-    an obstacle in it, and half a diagonal of each. In a cell that an obstacle fills there is none.
-    A way leads through faces of cells; where it goes through a corner, it touches all cells around.
+    The clearance of a point is at most the distance between the middles of its cell and of a cell
+    that an obstacle touches, plus half the diagonal of each. It is 0 in a cell that an obstacle
+    fills. A path leads through faces of cells; where it leads through a corner, it touches all
+    cells around it.
 
     Args:
         world: The world.
-        start: Where the middle of the disc is at first, shape (d,).
-        goal: Where it should get.
-        cells: Cells of the lattice.
-        enough: Widths from here on need not be told apart.
+        start: Where the centre of the disc is at first, shape (d,).
+        goal: Where it should get to.
+        cells: Cells of the raster.
+        enough: Widths from here on are not distinguished.
 
     Returns:
-        The greatest width, or inf if that is more than `enough`; 0 where not even a point gets
-        through.
+        The bound, or inf if it is more than `enough`; 0 if not even a point can move there.
     """
     obstacles = obstacle_arrays(world.without_grid())
-    lattice = Raster.over(world.lower, world.upper, cells)
-    size, diagonal = float(lattice.cell.max()), float(np.hypot.reduce(lattice.cell))
+    raster = Raster.over(world.lower, world.upper, cells)
+    size, diagonal = float(raster.cell.max()), float(np.hypot.reduce(raster.cell))
     farthest = int(enough / 2 / size) + 2
-    square = clearance(~lattice.blocked(obstacles), lattice.cell, farthest)
-    room = np.where(lattice.filled(obstacles), 0.0, (np.sqrt(square) + diagonal) * _SURE)
-    one, other = (tuple(lattice.index(end).tolist()) for end in (start, goal))
-    label = components(room > 0)
+    square = clearance(~raster.blocked(obstacles), raster.cell, farthest)
+    bound = np.where(raster.filled(obstacles), 0.0, (np.sqrt(square) + diagonal) * _ENLARGED)
+    one, other = (tuple(raster.index(end).tolist()) for end in (start, goal))
+    label = components(bound > 0)
     if label[one] != label[other] or label[one] < 0:
         return 0.0
-    width = 2 * _bottleneck(room, one, other)[0]
+    width = 2 * _bottleneck(bound, one, other)[0]
     return width if width <= enough else np.inf
 
 
 def clearance(free: Bools, cell: Floats, farthest: int) -> Floats:
     """Measure from each cell's middle to that of the nearest cell that is not free.
 
-    Cells around the lattice are not free. One axis after the other, the least sum of squares is
-    taken (Felzenszwalb and Huttenlocher 2012), over so many cells as are of interest.
+    Cells outside the raster are not free. The least sum of squares is taken along one axis after
+    the other (Felzenszwalb and Huttenlocher 2012).
 
     Args:
         free: Whether each cell is free.
         cell: Sides of a cell, shape (d,).
-        farthest: Distances beyond so many cells are taken to be that.
+        farthest: Longer distances, in cells, are replaced by this one.
 
     Returns:
         The squares of the distances, shape of `free`.
@@ -196,47 +196,52 @@ def clearance(free: Bools, cell: Floats, farthest: int) -> Floats:
     return square[(slice(1, -1),) * free.ndim]
 
 
-def _roomiest(square: Floats, cell: Cell) -> Cell:
-    """Climb from a cell to where there is more room, as long as a cell around has more."""
+def _climb(square: Floats, cell: Cell) -> Cell:
+    """Climb from a cell to a local maximum of clearance."""
     around = np.array(list(itertools.product((-1, 0, 1), repeat=len(cell))))
     here = np.array(cell)
     while True:
         cells = here + around
         cells = cells[((cells >= 0) & (cells < square.shape)).all(axis=1)]
-        rooms = square[tuple(cells.T)]
-        if rooms.max() <= square[tuple(here)]:
+        values = square[tuple(cells.T)]
+        if values.max() <= square[tuple(here)]:
             return tuple(here.tolist())
-        here = cells[int(rooms.argmax())]
+        here = cells[int(values.argmax())]
 
 
-def _bottleneck(square: Floats, start: Cell, goal: Cell) -> tuple[float, Ints]:
-    """Find the greatest clearance, as the square or itself, with which cells lead from end to end.
-
-    Returns:
-        It, and the sets of cells that hang together and have more, -1 for all others.
-    """
-    rooms = np.unique(square[square > 0])
-    rooms = rooms[rooms <= min(square[start], square[goal])]
-    low, high = 0, len(rooms)
-    # With the least clearance there is a way; with one beyond the last there is none.
-    while high - low > 1:
-        middle = (low + high) // 2
-        label = components(square >= rooms[middle])
-        low, high = (middle, high) if label[start] == label[goal] else (low, middle)
-    return float(rooms[low]), components(square > rooms[low])
-
-
-def _neck(open_: Bools, label: Ints, start: Cell, goal: Cell) -> Ints:
-    """Find the longest stretch without room to spare on the way with fewest of it, shape (k, d).
+def _bottleneck(values: Floats, start: Cell, goal: Cell) -> tuple[float, Ints]:
+    """Find the greatest value such that cells with at least that value connect start and goal.
 
     Args:
-        open_: Cells with at least the bottleneck's clearance.
-        label: Sets of cells that have more, -1 for others.
-        start: A cell of one set.
+        values: Clearance of each cell, or its square.
+        start: A cell.
+        goal: Another, connected with the first by values above 0.
+
+    Returns:
+        The value, and labels of the components of cells with more, -1 for all others.
+    """
+    levels = np.unique(values[values > 0])
+    levels = levels[levels <= min(values[start], values[goal])]
+    low, high = 0, len(levels)
+    # The cells connect at levels[low] and do not at levels[high].
+    while high - low > 1:
+        middle = (low + high) // 2
+        label = components(values >= levels[middle])
+        low, high = (middle, high) if label[start] == label[goal] else (low, middle)
+    return float(levels[low]), components(values > levels[low])
+
+
+def _bottleneck_cells(passable: Bools, label: Ints, start: Cell, goal: Cell) -> Ints:
+    """Find the longest run of bottleneck cells on the path with fewest of them, shape (k, d).
+
+    Args:
+        passable: Cells with at least the bottleneck's clearance.
+        label: Components of the cells with more, -1 for others.
+        start: A cell of one component.
         goal: A cell of another.
     """
-    tight = np.flatnonzero(open_ & (label < 0))
-    # Sets of cells are numbered from 0 on, tight cells behind them.
+    tight = np.flatnonzero(passable & (label < 0))
+    # Nodes of a graph: the components, numbered from 0, then the bottleneck cells.
     number, first = label.copy(), int(label.max()) + 1
     number[np.unravel_index(tight, label.shape)] = first + np.arange(len(tight))
     links: dict[int, list[int]] = {}
@@ -246,26 +251,27 @@ def _neck(open_: Bools, label: Ints, start: Cell, goal: Cell) -> Ints:
         for a, b in np.unique(np.stack([one[meet], other[meet]], axis=1), axis=0).tolist():
             links.setdefault(a, []).append(b)
             links.setdefault(b, []).append(a)
-    before = _fewest(links, int(label[start]), int(label[goal]), first)
-    stretches: list[list[int]] = [[]]
+    parents = _shortest_paths(links, int(label[start]), int(label[goal]), first)
+    runs: list[list[int]] = [[]]
     at = int(label[goal])
     while at != label[start]:
-        at = before[at]
+        at = parents[at]
         if at >= first:
-            stretches[-1].append(at)
+            runs[-1].append(at)
         else:
-            stretches.append([])
-    longest = max(stretches, key=len)
-    flat = tight[np.array(longest) - first]
+            runs.append([])
+    flat = tight[np.array(max(runs, key=len)) - first]
     return np.stack(np.unravel_index(flat, label.shape), axis=1)
 
 
-def _fewest(links: dict[int, list[int]], start: int, goal: int, first: int) -> dict[int, int]:
-    """Search from set to set through as few tight cells as can be; say where each is reached from.
+def _shortest_paths(
+    links: dict[int, list[int]], start: int, goal: int, first: int
+) -> dict[int, int]:
+    """Search a graph (0-1 breadth-first) and return the parent of each node reached.
 
-    Numbers from `first` on are tight cells, which cost 1; sets cost nothing.
+    Nodes from number `first` on cost 1, the others nothing.
     """
-    before, cost, waiting = {start: start}, {start: 0}, deque([start])
+    parents, cost, waiting = {start: start}, {start: 0}, deque([start])
     done: set[int] = set()
     while waiting:
         at = waiting.popleft()
@@ -277,9 +283,6 @@ def _fewest(links: dict[int, list[int]], start: int, goal: int, first: int) -> d
         for other in links.get(at, []):
             through = cost[at] + (other >= first)
             if through < cost.get(other, 1 << 62):
-                cost[other], before[other] = through, at
+                cost[other], parents[other] = through, at
                 (waiting.append if other >= first else waiting.appendleft)(other)
-    return before
-
-
-__all__ = ["Passage", "clearance", "narrowest", "widest"]
+    return parents

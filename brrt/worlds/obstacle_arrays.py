@@ -1,30 +1,26 @@
-"""A world's obstacles for numpy, many at once: where they are, and whether they touch points."""
+"""A world's obstacles as arrays: their extents, and whether they touch points."""
 
 from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brrt.worlds.arrays import Bools, Floats, Ints
 from brrt.worlds.world import World
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-
 ROUNDING = 1e-14
-"""Bounds what a few operations lose, as a part of the numbers at hand."""
-_SAFE = 2e-15
-"""A polygon touches what is nearer than this part of the lengths at hand; see `convex.gap`."""
+"""Bound of the relative rounding error of a few operations."""
+_TOUCHING = 2e-15
+"""A polygon touches what is nearer than this part of the lengths involved; see `convex.gap`."""
 
 
 class ObstacleArray(Protocol):
     """Obstacles of one kind.
 
     Attributes:
-        low: Least corner of the box around each, shape (n, d).
+        low: Least corner of each one's bounding box, shape (n, d).
         high: Greatest corner, shape (n, d).
-        weights: What each costs to look at, shape (n,).
+        weights: Relative cost of a test against each, shape (n,).
     """
 
     low: Floats
@@ -32,10 +28,10 @@ class ObstacleArray(Protocol):
     weights: Ints
 
     def reach(self, i: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """From where to where obstacles reach along the last axis, within a slab each.
+        """Return the interval that obstacles cover along the last axis, each within a slab.
 
-        The interval is the least one, up to rounding, and errs on the long side; where an obstacle
-        does not touch its slab it is (inf, -inf).
+        The interval may be too long by rounding, never too short; it is (inf, -inf) where an
+        obstacle does not touch its slab.
 
         Args:
             i: Which obstacles, shape (k,).
@@ -72,15 +68,14 @@ class BallArray:
 
     def __init__(self, balls: Floats) -> None:
         self._centres, self._radii = balls[:, :-1], balls[:, -1]
-        reach = self._radii[:, None]
-        self.low, self.high = self._centres - reach, self._centres + reach
+        self.low, self.high = self._centres - balls[:, -1:], self._centres + balls[:, -1:]
         self.weights = np.ones(len(balls), np.int64)
 
     def reach(self, i: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         """See `ObstacleArray`."""
         centres = self._centres[i]
         across = centres[:, :-1]
-        # Rounding may make the distance to the slab too large: the radius makes up for it.
+        # The computed distance to the slab may be too large by rounding; a larger radius covers it.
         slack = ROUNDING * (np.abs(centres).max(axis=1) + self._radii[i])
         radii = self._radii[i] + slack
         distances = np.linalg.norm(np.clip(across, low, high) - across, axis=1)
@@ -94,10 +89,13 @@ class BallArray:
 
 
 class PolygonArray:
-    """Convex polygons and line segments in the plane."""
+    """Convex polygons and line segments in the plane.
+
+    The vertices, edges and half planes of all polygons are stored one after the other; those of
+    polygon i begin at first[i].
+    """
 
     def __init__(self, polygons: tuple[Floats, ...]) -> None:
-        # What belongs to polygon i stands from first[i] on, one beside the other.
         self.weights = np.array([len(polygon) for polygon in polygons])
         self._first = np.cumsum(self.weights) - self.weights
         owner, offset = expand_counts(self.weights)
@@ -111,14 +109,20 @@ class PolygonArray:
         self._origins = vertices[self._first]
         local = vertices - self._origins[owner]
         self._sizes = np.maximum.reduceat(np.abs(local).max(axis=1), self._first)
-        self._set_sides(local, local[after] - local, owner)
+        self._set_half_planes(local, local[after] - local, owner)
 
-    def _set_sides(self, local: Floats, along: Floats, owner: Ints) -> None:
-        """Keep the half planes that shapes are made of, as `convex.axes_of` has them."""
+    def _set_half_planes(self, local: Floats, along: Floats, owner: Ints) -> None:
+        """Store normals and offsets of the half planes, in the order of `convex.axes_of`.
+
+        Args:
+            local: Vertices relative to their polygon's first one, shape (n, 2).
+            along: Edge from each vertex to the next, shape (n, 2).
+            owner: Polygon of each vertex, shape (n,).
+        """
         along /= np.abs(along).max(axis=1, keepdims=True)
         along /= np.hypot(*along.T)[:, None]
         normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        # A line segment has its ends besides.
+        # A line segment is also bounded at its two ends.
         segments = self.weights[owner] == 2
         owner = np.concatenate([owner, owner[segments]])
         order = np.argsort(owner, kind="stable")
@@ -132,11 +136,11 @@ class PolygonArray:
 
     def reach(self, i: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         """See `ObstacleArray`."""
-        # A shape within a slab is widest at its outline.
+        # Within a slab, a convex shape has its extremes on its outline.
         owner, offset = expand_counts(self.weights[i])
         x, y = np.moveaxis(self._edges[self._first[i][owner] + offset], -1, 0)
-        # A nearly upright edge crosses the slab's side somewhere along a stretch of y: all of it
-        # is within a slab that is wider by the rounding.
+        # The y at which a nearly vertical edge crosses the slab's side is uncertain by rounding. A
+        # slab that is wider by the rounding contains all of that uncertainty.
         slack = ROUNDING * np.abs(x).max(axis=1)
         left, right = low[owner, 0] - slack, high[owner, 0] + slack
         apart = (x[:, 1] < left) | (right < x[:, 0])
@@ -157,12 +161,12 @@ class PolygonArray:
         side = self._first_side[i][owner] + offset
         local = points - self._origins[i]
         beyond = (local[owner] * self._normals[side]).sum(axis=1) - self._limits[side]
-        slack = _SAFE * np.maximum(np.abs(local).max(axis=1), self._sizes[i])
+        slack = _TOUCHING * np.maximum(np.abs(local).max(axis=1), self._sizes[i])
         return np.asarray(np.maximum.reduceat(beyond, np.flatnonzero(offset == 0)) <= slack)
 
 
 def obstacle_arrays(world: World) -> list[ObstacleArray]:
-    """Return a world's obstacles, kind by kind, as far as there are any."""
+    """Return a world's balls, boxes and polygons, as far as it has any; its grid is left out."""
     found: list[ObstacleArray] = []
     if len(world.balls):
         found.append(BallArray(world.balls))
@@ -174,13 +178,17 @@ def obstacle_arrays(world: World) -> list[ObstacleArray]:
 
 
 def expand_counts(counts: Ints) -> tuple[Ints, Ints]:
-    """Return for counts[i] items of each i, one after the other, i and the number within i."""
+    """Number items that come in groups, counts[i] in group i.
+
+    Returns:
+        Group of each item, and its number within the group, shape (sum of counts,) each.
+    """
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def chunks(weights: Ints, limit: int) -> Iterator[slice]:
-    """Cut items into parts of that weight at most, or of one item that weighs more."""
+    """Divide items into slices with a total weight of at most `limit`, or of one heavier item."""
     ends, begin = np.cumsum(weights), 0
     while begin < len(weights):
         before = ends[begin] - weights[begin]

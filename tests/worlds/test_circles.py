@@ -31,7 +31,7 @@ def test_queries(tmp_path: Path) -> None:
         assert world.goal is not None
         assert world.goal.tolist() == goal
         assert bool(world.notes) == (not spec)
-    assert load_world(path).notes == (f"{path}: query 0 of 2; name one as {path}#7",)
+    assert load_world(path).notes == (f"{path}: query 0 of 2; choose one as {path}#7",)
     assert make_world(f"{path}:obstacles=other.txt#0").balls.tolist() == [[0, 0, 9]]
     for spec, message in {
         "#3": ": no query 3; there are 2",
@@ -41,8 +41,7 @@ def test_queries(tmp_path: Path) -> None:
         assert refused(partial(make_world, f"{path}{spec}")).startswith(f"{path}{message}")
     path.write_text("0 start: 1 2\n0 goal: 70 2\n")
     assert refused(lambda: load_world(path)) == (
-        f"{path}: the goal 70, 2 lies outside the bounds of the circles; "
-        f"give room: {path}:margin=10"
+        f"{path}: the goal 70, 2 is outside the bounds of the circles; give {path}:margin=10"
     )
     assert make_world(f"{path}:margin=63").goal is not None
     path.rename(tmp_path / "queries_of_no_circles.txt")
@@ -59,7 +58,7 @@ def test_queries(tmp_path: Path) -> None:
         ("3 1 two 3", "'3 1 two 3' is not all numbers"),
         ("3 1 nan 3", "a number is not finite"),
         ("3 1 1e101 3", "a number is beyond 1e+100"),
-        ("3 1 2 -1", "the radius -1 is below zero"),
+        ("3 1 2 -1", "the radius must be at least 0, not -1"),
         ("x y r", "3 words; there must be 4"),
     ],
 )
@@ -71,7 +70,9 @@ def test_wrong_circles(line: str, message: str, tmp_path: Path) -> None:
     path.write_text("units: meter\n")
     assert refused(lambda: load_world(path)).startswith(f"{path}: no circles; each is a line of")
     path.write_text("units: meter\n1 2 3 0\n")
-    assert refused(lambda: load_world(path)).startswith(f"{path}: the circles span no area; give")
+    assert refused(lambda: load_world(path)).startswith(
+        f"{path}: the bounds of the circles have no area; give"
+    )
 
 
 @pytest.mark.parametrize(
@@ -82,7 +83,7 @@ def test_wrong_circles(line: str, message: str, tmp_path: Path) -> None:
         ("eight start: 1 2", ":5: a query must be a whole number"),
         ("7 start: 1 2", ":5: a second start of query 7"),
         ("8 start: 1 inf", ":5: a number is not finite"),
-        ("8 start: 1 2", ": no query 8; it has start alone"),
+        ("8 start: 1 2", ": no query 8; it has only a start"),
     ],
 )
 def test_wrong_queries(line: str, message: str, tmp_path: Path) -> None:
@@ -118,7 +119,7 @@ def test_blocks_outside_are_named(tmp_path: Path) -> None:
     assert world.notes == (
         f"{path}: block in line 4 reaches outside the boundary by 0.5 in x",
         f"{path}: block in line 6 reaches outside the boundary by 2 in y and 3 in z",
-        f"{path}: block in line 7 lies wholly outside the boundary by 12 in x and 12 in z",
+        f"{path}: block in line 7 is entirely outside the boundary by 12 in x and 12 in z",
     )
     path.write_text("boundary 0 0 0 1 1 1\n" + "block 0 0 0 2 1 1\n" * 15)
     assert len(load_world(path).notes) == 11

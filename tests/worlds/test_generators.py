@@ -346,7 +346,7 @@ def test_only_one_end_given(name: str) -> None:
         ("circles2d:size=10", "max_radius 8 does not fit the map; it is at most 5"),
         ("circles2d:density=1.1", "density must be at most 1, not 1.1"),
         ("circles2d:density=-0.1", "density must be at least 0, not -0.1"),
-        ("boxes3d:density=0.2,n=20", "n 20 and density 0.2 contradict; give one of them"),
+        ("boxes3d:density=0.2,n=20", "n 20 and density 0.2 exclude each other; give one"),
         ("circles2d:connected=maybe", "connected must be true or false, not 'maybe'"),
         ("forest2d:radius=51", "radius 51 does not fit the map; it is at most 50"),
         ("forest2d:radius=0.1,gap=0.1", "trees 0.3 apart are too many for the map; make twice"),
@@ -374,7 +374,7 @@ def test_only_one_end_given(name: str) -> None:
         ("circles2d:n=", "n must be a whole number, not ''"),
         ("circels2d", "unknown world 'circels2d'; did you mean 'circles2d'?"),
         ("Circles2D", "did you mean 'circles2d'?"),
-        ("nothing", "unknown world 'nothing'; there is: boxes2d, boxes3d, bugtrap2d"),
+        ("nothing", "unknown world 'nothing'; choose from: boxes2d, boxes3d, bugtrap2d"),
         ("maps/none.txt", "maps/none.txt: No such file"),
         ("maps/none", "maps/none: no such file"),
         ("none.zip", "none.zip: no such file"),
@@ -425,7 +425,7 @@ def test_density(name: str, density: float) -> None:
     world = make_world(f"{name}:density={density},seed=4")
     (note,) = world.notes
     count, share = re.fullmatch(
-        rf"density {density} asked for: (\d+) obstacles cover (0\.\d+) of the map", note
+        rf"density {density}: (\d+) obstacles cover (0\.\d+) of the map", note
     ).groups()  # type: ignore[union-attr]
     assert int(count) == len(world.balls) + len(world.boxes) + len(world.polygons)
     error = 4 * np.sqrt(density / len(points)) + 0.003
@@ -460,7 +460,7 @@ def test_a_density_out_of_reach(spec: str) -> None:
     """Corners and the places around start and goal stay free, so that some shares are too much."""
     why = refused(lambda: make_world(f"circles2d:min_radius=2,{spec}"))
     assert "cannot be reached" in why
-    assert "obstacles cover no more than 0.9" in why
+    assert "obstacles cover only 0.9" in why
 
 
 def test_a_density_of_specks() -> None:
@@ -536,7 +536,7 @@ def test_connected_on_request() -> None:
         assert way(world, 1600)
         assert_same(world, make_world(spec + ",connected=true", start, goal))
         differs = plain.balls.tobytes() != world.balls.tobytes()
-        notes = [note for note in world.notes if "is the first with a way" in note]
+        notes = [note for note in world.notes if "is the first with a path" in note]
         assert len(notes) == differs
         redrawn += differs
     assert redrawn
@@ -555,7 +555,7 @@ def test_no_way(spec: str, start: list[float], message: str) -> None:
     """The error says what it rests on, and what may help."""
     spec += ":connected=true" if ":" not in spec else ",connected=true"
     why = refused(lambda: make_world(spec, np.array(start, np.float64)))
-    assert f"world {spec}: not known to be connected {message}" in why
+    assert f"world {spec}: no path from start to goal was found {message}" in why
 
 
 # Boxes with holes

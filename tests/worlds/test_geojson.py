@@ -123,8 +123,8 @@ def test_all_kinds(tmp_path: Path) -> None:
     assert (world.start.tolist(), world.goal.tolist()) == ([5, 5], [6, 6])
     assert (world.lower.tolist(), world.upper.tolist()) == ([-1.4, -1.4], [15.4, 7.4])
     assert [note.split(": ")[1] for note in world.notes] == [
-        "1 of type Point left out; polygons are obstacles",
-        "1 of type LineString left out; polygons are obstacles",
+        "1 of type Point ignored; only polygons are obstacles",
+        "1 of type LineString ignored; only polygons are obstacles",
     ]
     assert loaded(data, tmp_path, ":margin=2").lower.tolist() == [-2, -2]
     boxed = data | {"bbox": [-1, -2, 20, 30]}
@@ -147,7 +147,7 @@ BOW = [[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]
         ({"type": 3}, ": not an object of GeoJSON with a type"),
         ({"type": "FeatureCollection"}, ": features must be a list"),
         ({"type": "FeatureCollection", "features": [3]}, ": features[0]: not an object of GeoJSON"),
-        ({"type": "FeatureCollection", "features": []}, ": no polygons in it, no start, no goal"),
+        ({"type": "FeatureCollection", "features": []}, ": it contains no polygons, no start"),
         (of("Polygon", None), ": coordinates must be a list"),
         (of("Polygon", [[]]), ": ring 0 must be positions of 2 or 3 or 4 numbers"),
         (of("Polygon", [[[0, 0], [1]]]), ": ring 0 must be positions"),
@@ -171,9 +171,9 @@ BOW = [[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]
             ": features[1]: a second start",
         ),
         (feature(of("Point", [1, "x"]), role="goal"), ": goal must be positions of"),
-        (feature(of("Point", [1, 2]), role="goal"), ": its bounds span no area; give room: "),
+        (feature(of("Point", [1, 2]), role="goal"), ": the bounds have no area; give "),
         (of("Polygon", [SQUARE]) | {"bbox": [0, 0, 1]}, ": bbox must be positions of 4 or 6"),
-        (of("Polygon", [SQUARE]) | {"bbox": [0, 0, -1, 1]}, ": its bounds span no area"),
+        (of("Polygon", [SQUARE]) | {"bbox": [0, 0, -1, 1]}, ": the bounds have no area"),
         (of("Polygon", [SQUARE * 60_000]), ": more than 200,000 vertices; simplify the polygons"),
         (of("Polygon", [SQUARE * 7000]), ": more than 30,000 vertices; simplify the polygon"),
     ],

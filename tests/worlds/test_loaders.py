@@ -124,7 +124,7 @@ def test_parameters_and_queries_reach_the_loader(folder: Path) -> None:
         lambda: make_world(f"{folder}/image.pgm:resolution=0")
     )
     assert refused(lambda: make_world(f"{folder}/grid.map#1")) == (
-        f"{folder}/grid.map: there is nothing to choose in it; leave out '#1'"
+        f"{folder}/grid.map: this file has no queries to choose from; omit '#1'"
     )
 
 
@@ -162,7 +162,7 @@ def test_real_worlds(path: Path | None) -> None:
     if path is None:
         pytest.skip("no real worlds here")
     if path.name == "invalid_image.yaml":
-        remedy = f"there is no image 'invalid.png' here; say where: {path}:image=PATH"
+        remedy = f"the image 'invalid.png' does not exist; give {path}:image=PATH"
         assert refused(lambda: load_world(path)) == f"{path}:1: image: {remedy}"
         assert make_world(f"{path}:image=testmap.png").grid is not None
         return

@@ -52,10 +52,10 @@ def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
         ("type octile\nheight ²\nwidth 3\nmap\n", "grid:2: height must be a whole number from 1"),
         ("type octile\nheight 2\nwidth 1e9\nmap\n", "grid:3: width must be a whole number from 1"),
         (f"type octile\nheight 2\nwidth {'9' * 5000}\nmap\n", "grid:3: width must be a whole"),
-        ("type octile\nheight 2\nwidth 3\n...\n...\n", "grid:4: there must be the line 'map'"),
-        (HEAD + "...\n", "grid: 1 rows below 'map'; the header says height 2"),
-        (HEAD + "...\n...\n...\n", "grid: 3 rows below 'map'; the header says height 2"),
-        (HEAD + "...\n....\n", "grid:6: 4 characters; the header says width 3"),
+        ("type octile\nheight 2\nwidth 3\n...\n...\n", "grid:4: this must be the line 'map'"),
+        (HEAD + "...\n", "grid: 1 rows below 'map'; the header states height 2"),
+        (HEAD + "...\n...\n...\n", "grid: 3 rows below 'map'; the header states height 2"),
+        (HEAD + "...\n....\n", "grid:6: 4 characters; the header states width 3"),
         (HEAD + ".X.\n...\n", "grid:5: unknown character 'X'; a cell is one of .GS (free) or @OTW"),
         (HEAD + "...\n.é.\n", "grid:6: unknown character 'é'"),
     ],
@@ -103,7 +103,7 @@ def test_scenarios(scen: Path) -> None:
         ("#2", [2.5, 0.5], [0.5, 1.5]), ("#bucket=3", [0.5, 1.5], [2.5, 1.5]),
     ):  # fmt: skip
         assert ends(make_world(f"{scen}{query}")) == [start, goal]
-    first = f"{scen}: scenario 0 of 3; name another as {scen}#12"
+    first = f"{scen}: scenario 0 of 3; choose another as {scen}#12"
     length = f"{scen}:2: the stated length of the best path in 8 directions is 1"
     assert load_world(scen).notes == (first, length)
     (note,) = make_world(f"{scen}#2").notes
@@ -117,9 +117,9 @@ def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
     (tmp_path / "grid.map").rename(tmp_path / "maps" / "grid.map")
     assert load_world(scen).grid is not None
     (tmp_path / "maps" / "grid.map").rename(tmp_path / "maps" / "other.map")
-    remedy = f"say where: {scen}:map=PATH"
+    remedy = f"give {scen}:map=PATH"
     error = refused(lambda: load_world(scen))
-    assert error == f"{scen}:2: its map 'maps/grid.map' is not beside the file; {remedy}"
+    assert error == f"{scen}:2: its map 'maps/grid.map' does not exist; {remedy}"
     assert make_world(f"{scen}:map={tmp_path}/maps/other.map#1").grid is not None
     assert make_world(f"{scen}:map=maps/other.map#1").grid is not None
     inner = tmp_path / "lists"
@@ -128,7 +128,7 @@ def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
         (inner / "s.scen").write_text(LIST.replace("maps/grid.map", name))
         error = refused(lambda: load_world(inner / "s.scen"))
         assert (
-            f"s.scen:2: {name[:80]!r} leads out of the file's folder; if it is right, say" in error
+            f"s.scen:2: {name[:80]!r} is outside the file's folder; if it is right, give" in error
         )
 
 
@@ -139,8 +139,8 @@ def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
         ("version 1\n", "", ":1: the first line must be 'version 1'"),
         (LIST, "version 1\n\n", ": no scenario 0; there are 0, counted from 0"),
         ("\t1\n", "\n", ":2: 8 fields; there must be 9: bucket, map, width, height, start x y"),
-        ("\t3\t2\t0\t0", "\t2\t3\t0\t0", ":2: width 2, but that of "),
-        ("\t3\t2\t0\t0", "\t3\t3\t0\t0", ":2: height 3, but that of "),
+        ("\t3\t2\t0\t0", "\t2\t3\t0\t0", ":2: width 2, but "),
+        ("\t3\t2\t0\t0", "\t3\t3\t0\t0", ":2: height 3, but "),
         ("\t3\t2\t0\t0", "\t3\tx\t0\t0", ":2: height must be a whole number from 1 to 100,000"),
         ("\t2\t0\t0\t0", "\t2\t3\t0\t0", ":2: the start's x must be a whole number from 0 to 2"),
         ("\t2\t0\t0\t0", "\t2\t-1\t0\t0", ":2: the start's x must be a whole number from 0"),

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from brrt import BrrtError, Grid, World, make_world
 from brrt.worlds.convex import convex_polygon, inscribed
 from brrt.worlds.free_space import occupied
-from brrt.worlds.narrow_passage import clearance, narrowest, widest
+from brrt.worlds.narrow_passage import clearance, max_width, narrowest_passage
 from brrt.worlds.obstacle_arrays import obstacle_arrays
 from brrt.worlds.rasterize import Raster
 
@@ -62,7 +62,7 @@ def test_the_bottleneck_is_that_of_the_widest_way(seed: int) -> None:
     ends = rng.permutation(np.argwhere(free))[:2]
     start, goal = (np.array([column + 0.5, row + 0.5]) for row, column in ends)
     world = World.of_grid("map", grid)
-    found = narrowest(world, start, goal)
+    found = narrowest_passage(world, start, goal)
     square = clearance(free.T, np.ones(2), 32)
     # Ends in a narrow place of their own do not count: from each it is uphill at first.
     peaks = [_uphill(square, np.floor(end).astype(int)) for end in (start, goal)]
@@ -74,10 +74,10 @@ def test_the_bottleneck_is_that_of_the_widest_way(seed: int) -> None:
     assert (found.low, found.high) == (2 * np.sqrt(least) - 1, 2 * np.sqrt(least) + 2)
     at = tuple(np.floor(found.place).astype(int))
     assert square[at] == least
-    if found.behind.any():
-        assert found.behind[peaks[1]]
-        assert not found.behind[peaks[0]]
-        assert (square[found.behind] > least).all()
+    if found.beyond.any():
+        assert found.beyond[peaks[1]]
+        assert not found.beyond[peaks[0]]
+        assert (square[found.beyond] > least).all()
 
 
 def _uphill(square: np.ndarray, at: np.ndarray) -> tuple[int, ...]:
@@ -97,21 +97,21 @@ def test_a_gap_is_as_wide_as_it_was_made(kind: str, gap: float) -> None:
     world = make_world(f"{kind}:gap={gap}")
     assert world.start is not None
     assert world.goal is not None
-    found = narrowest(world, world.start, world.goal)
+    found = narrowest_passage(world, world.start, world.goal)
     assert found is not None
     assert found.low <= gap <= found.high
     assert found.high - found.low < 5
     walls = world.boxes
     assert walls[:, 0].min() - 1 <= found.place[0] <= walls[:, 2].max() + 1
-    assert found.passed(np.array([[90.0, 50.0], [10.0, 50.0]])).tolist() == [True, False]
+    assert found.is_beyond(np.array([[90.0, 50.0], [10.0, 50.0]])).tolist() == [True, False]
 
 
 def test_no_way_is_none() -> None:
     """A goal behind closed walls."""
     boxes = np.array([[4, 4, 9, 5], [4, 8, 9, 9], [4, 4, 5, 9], [8, 4, 9, 9]], float)
     world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=boxes)
-    assert narrowest(world, np.array([1.0, 1.0]), np.array([6.5, 6.5])) is None
-    assert widest(world, np.array([1.0, 1.0]), np.array([6.5, 6.5]), 1 << 12, 1.0) == 0
+    assert narrowest_passage(world, np.array([1.0, 1.0]), np.array([6.5, 6.5])) is None
+    assert max_width(world, np.array([1.0, 1.0]), np.array([6.5, 6.5]), 1 << 12, 1.0) == 0
 
 
 @settings(max_examples=25)
@@ -122,7 +122,9 @@ def test_what_no_disc_gets_through_is_proven(seed: int) -> None:
     free = rng.random((24, 30)) > 0.12
     ends = rng.permutation(np.argwhere(free))[:2]
     start, goal = (np.array([column + 0.5, row + 0.5]) for row, column in ends)
-    bound = widest(World.of_grid("map", Grid(~free, np.zeros(2), 1.0)), start, goal, 1 << 13, 9.0)
+    bound = max_width(
+        World.of_grid("map", Grid(~free, np.zeros(2), 1.0)), start, goal, 1 << 13, 9.0
+    )
     square = clearance(free.T, np.ones(2), 32)
     least = _widest(square, *(tuple(np.floor(end).astype(int)) for end in (start, goal)))
     # From middle to middle there is as much room, but for half of each cell and of the way.
@@ -136,7 +138,7 @@ def test_the_bound_is_near_to_the_width(gap: float, bound: float) -> None:
     world = make_world(f"passage2d:gap={gap}")
     assert world.start is not None
     assert world.goal is not None
-    assert gap <= widest(world, world.start, world.goal, 1 << 16, 8.0) <= bound
+    assert gap <= max_width(world, world.start, world.goal, 1 << 16, 8.0) <= bound
 
 
 @settings(max_examples=30)

@@ -1,13 +1,13 @@
-"""Boxes that are left when something is cut out of a box or a lattice."""
+"""Boxes that remain when a part of a box or of a grid of cells is removed."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from brrt.worlds.arrays import Bools, Floats
 
 
 def subtract_box(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
-    """Return the boxes that fill a box but for a hole; none of them is flat.
+    """Return boxes that together fill a box except for a hole; none of them is flat.
 
     Args:
         lower: Least corner of the box, shape (d,).
@@ -15,8 +15,8 @@ def subtract_box(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
         hole: Least and greatest corner of the hole, shape (2, d); it may reach beyond the box.
 
     Returns:
-        Boxes as least and greatest corner, shape (k, 2 d): at most two an axis, those of the first
-        axis the largest.
+        Boxes as least and greatest corner, shape (k, 2 d): at most two for each axis, those of the
+        first axis the largest.
     """
     low, high = np.array(lower, np.float64), np.array(upper, np.float64)
     first, last = np.clip(np.asarray(hole, np.float64), low, high)
@@ -32,14 +32,14 @@ def subtract_box(lower: ArrayLike, upper: ArrayLike, hole: ArrayLike) -> Floats:
     return np.array(boxes).reshape(-1, 2 * len(low))
 
 
-def merge_cells(blocked: NDArray[np.bool_], edges: Floats) -> Floats:
-    """Return few boxes that fill the blocked cells of a lattice and no others.
+def merge_cells(blocked: Bools, edges: Floats) -> Floats:
+    """Return a few boxes that together fill the blocked cells of a grid.
 
-    Cells become runs along the first axis, equal runs that touch become plates along the next.
+    Cells are merged into runs along the first axis, equal adjacent runs into plates along the next.
 
     Args:
-        blocked: Whether each cell is, shape (n, ..., n), one axis a dimension.
-        edges: Where cells begin and end, the same along each axis, increasing, shape (n + 1,).
+        blocked: Whether each cell is blocked, shape (n, ..., n), one axis for each dimension.
+        edges: Coordinates between cells, the same for each axis, increasing, shape (n + 1,).
 
     Returns:
         Boxes as least and greatest corner, shape (k, 2 d); touching ones share coordinates.

@@ -1,28 +1,28 @@
-"""The bug trap: easy to get into, hard to get out of."""
+"""Bug traps: easy to get into, hard to get out of."""
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from brrt.settings import param
+from brrt.worlds.arrays import Floats
 from brrt.worlds.generators.box_subtraction import subtract_box
-from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet, no_fit
-from brrt.worlds.generators.walls import shell
+from brrt.worlds.generators.generator import Fixed, Length, ObstacleSet
+from brrt.worlds.generators.walls import hollow_box
 
 _LIPS = np.deg2rad(150)
-"""Where around the trap, seen from its back, the wall turns inwards."""
+"""Angle around the trap, seen from its back, at which the wall turns inwards."""
 _STEPS = 6
-"""Rings that narrow down to the inlet in 3D."""
+"""Number of rings of the funnel in 3D."""
 
 
 @dataclass(frozen=True, slots=True)
 class BugTrap(Fixed):
     """A hollow body whose only way out is a funnel that reaches far into it.
 
-    The start is inside, between the funnel and the back; the goal stands behind the back, so that
-    the way leads through the inlet and around the body.
+    The start is inside, between the funnel and the back; the goal is outside, behind the back, so
+    that paths lead through the inlet and around the body.
     """
 
     side: float | None = param(None, "size of the trap; auto: 0.6 of the map's", above=0)
@@ -31,42 +31,25 @@ class BugTrap(Fixed):
         None, "thickness of its walls; auto: 0.04 of the trap's size", above=0
     )
 
+    across = Length("side", 0.6)
+    inlet = Length("gap", 0.06, of="across")
+    thickness = Length("wall", 0.04, of="across")
+
     def __post_init__(self) -> None:
-        """Check that inlet and walls fit the trap, and that the map."""
+        """Check that inlet and walls fit the trap, and the trap the map."""
         Fixed.__post_init__(self)
-        for name, value, most in (
+        self.check_fits(
             ("side", self.across, 0.8 * self.size),
             ("gap", self.inlet, 0.3 * self.across),
             ("wall", self.thickness, 0.1 * self.across),
-        ):
-            if value > most:
-                raise no_fit(name, value, most)
-
-    @property
-    def across(self) -> float:
-        """Size of the trap."""
-        return 0.6 * self.size if self.side is None else self.side
-
-    @property
-    def inlet(self) -> float:
-        """Width of the inlet."""
-        return 0.06 * self.across if self.gap is None else self.gap
-
-    @property
-    def thickness(self) -> float:
-        """Of the walls."""
-        return 0.04 * self.across if self.wall is None else self.wall
+        )
 
     def ends(self, _room: float, /) -> tuple[Floats, Floats]:
-        """Return a place between inlet and back, and one behind the back."""
+        """Return a point between inlet and back, and one behind the back."""
         start, goal = np.full((2, self.dim), 0.5 * self.size)
         start[0] += 0.25 * self.across
         goal[0] = 0.95 * self.size
         return start, goal
-
-    @abstractmethod
-    def layout(self) -> ObstacleSet:
-        """Build the trap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +58,8 @@ class BugTrap2D(BugTrap):
 
     dim: ClassVar[int] = 2
 
-    def layout(self) -> ObstacleSet:
-        """Build a strip along a line: inlet, funnel, lip, around the back, and the same again."""
+    def obstacles(self) -> ObstacleSet:
+        """Return a strip along a line: inlet, funnel, lip, around the back, and mirrored."""
         radius = (self.across - self.thickness) / 2
         beside = (self.inlet + self.thickness) / 2
         around = np.linspace(0, _LIPS, 13)
@@ -87,7 +70,7 @@ class BugTrap2D(BugTrap):
             ]
         )
         line = np.concatenate([half[:0:-1] * [1, -1], half])
-        return ObstacleSet(polygons=tuple(strip(line, self.thickness) + self.size / 2))
+        return ObstacleSet(polygons=tuple(_strip(line, self.thickness) + self.size / 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +79,13 @@ class BugTrap3D(BugTrap):
 
     dim: ClassVar[int] = 3
 
-    def layout(self) -> ObstacleSet:
-        """Build the cube with a mouth, and rings from there inwards, each narrower."""
+    def obstacles(self) -> ObstacleSet:
+        """Return the cube with a mouth, and rings from there inwards, each narrower."""
         middle = np.full(3, self.size / 2)
         mouth = 0.5 * self.across
         widths = np.linspace(mouth, self.inlet, _STEPS + 1)
         length = 0.5 * self.across / _STEPS
-        boxes = [shell(middle, self.across, self.thickness, mouth)]
+        boxes = [hollow_box(middle, self.across, self.thickness, mouth)]
         for i, width in enumerate(widths[1:]):
             low, high = (middle + sign * (widths[i] / 2 + self.thickness) for sign in (-1, 1))
             low[0] = middle[0] - self.across / 2 + i * length
@@ -113,16 +96,16 @@ class BugTrap3D(BugTrap):
         return ObstacleSet(boxes=np.concatenate(boxes))
 
 
-def strip(line: Floats, width: float) -> Floats:
-    """Return quadrilaterals that follow a line and share their ends, shape (n - 1, 4, 2).
+def _strip(line: Floats, width: float) -> Floats:
+    """Return quadrilaterals along a line that share their ends, shape (n - 1, 4, 2).
 
     Args:
-        line: Points, shape (n, 2); no sharp turns, and no pieces shorter than the width.
+        line: Points, shape (n, 2); no sharp turns, and no parts shorter than the width.
         width: Width of the strip.
     """
-    ahead = np.diff(line, axis=0)
-    ahead /= np.hypot(*ahead.T)[:, None]
-    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    along = np.diff(line, axis=0)
+    along /= np.hypot(*along.T)[:, None]
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
     # At a turn the sides meet on its bisector.
     both = np.concatenate([left[:1], left[:-1] + left[1:], left[-1:]])
     aside = both / np.concatenate([[1], (both[1:-1] * left[1:]).sum(axis=1), [1]])[:, None]

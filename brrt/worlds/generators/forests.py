@@ -1,43 +1,40 @@
-"""Forests: trees at random places that keep a distance from each other (a Poisson disc)."""
+"""Forests: trees at random places with a minimum distance (Poisson disc sampling)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
-from brrt.worlds.generators.generator import CLEARANCE, Floats, ObstacleSet, Query, Seeded, no_fit
+from brrt.worlds.arrays import Bools, Floats
+from brrt.worlds.generators.generator import CLEARANCE, Length, ObstacleSet, Query, Seeded
 
 _CANDIDATES = 30
-"""Places that are tried around a tree before it is taken to be surrounded; Bridson's k."""
+"""Places that are tried around a tree before it is considered surrounded; Bridson's k."""
 _MOST = 40_000
-"""Squares as wide as the distance of trees that the map may have."""
+"""Maximum area of the map, in squares of the trees' minimum distance."""
 
 
 def poisson_disc(
-    rng: np.random.Generator,
-    side: float,
-    apart: float,
-    allowed: Callable[[Floats], NDArray[np.bool_]],
+    rng: np.random.Generator, side: float, apart: float, allowed: Callable[[Floats], Bools]
 ) -> Floats:
-    """Fill a square with points that keep a distance until hardly another one fits.
+    """Fill a square with random points that keep a minimum distance.
 
-    R. Bridson: Fast Poisson disk sampling in arbitrary dimensions. SIGGRAPH sketches, 2007. All
-    points that are not known to be surrounded take turns to try a place at one to two distances.
+    R. Bridson: Fast Poisson disk sampling in arbitrary dimensions. SIGGRAPH sketches, 2007. In each
+    round, every active point tries one place at one to two distances from it.
 
     Args:
-        rng: Where the draws come from.
+        rng: Random number generator.
         side: Side of the square, whose least corner is the origin.
-        apart: The distance.
-        allowed: Whether points, shape (n, 2), may be at their places.
+        apart: The minimum distance.
+        allowed: Function of points, shape (n, 2), that returns which of them may be used.
 
     Returns:
-        Shape (n, 2); empty where none of many places was allowed.
+        Shape (n, 2); empty if none of 1000 first points is allowed.
     """
-    accepted = _Accepted(side, apart)
+    accepted = _PointGrid(side, apart)
     first = side * rng.random((1000, 2))
     accepted.add(first[allowed(first)][:1])
     active, failures = np.arange(accepted.count), np.zeros(accepted.count, np.int64)
@@ -57,8 +54,8 @@ def poisson_disc(
     return accepted.points[: accepted.count]
 
 
-class _Accepted:
-    """Points that keep a distance, and a grid whose cells hold one of them at most."""
+class _PointGrid:
+    """Points that keep a minimum distance, in a grid whose cells hold at most one of them."""
 
     def __init__(self, side: float, apart: float) -> None:
         self._apart = apart
@@ -69,7 +66,7 @@ class _Accepted:
         self.points = np.empty((cells**2, 2))
         self.count = 0
 
-    def add(self, tried: Floats) -> NDArray[np.bool_]:
+    def add(self, tried: Floats) -> Bools:
         """Add those of some points, shape (n, 2), that keep the distance; return which."""
         cells = (tried / self._cell).astype(np.int64)
         i, j = cells.T[:, :, None, None]
@@ -77,55 +74,52 @@ class _Accepted:
         free = self._free(self._grid[i + steps[:, None], j + steps], tried[:, None, None])
         for k in np.flatnonzero(free).tolist():
             i, j = cells[k]
-            # One that was added just now may be too near.
+            # A point added in this loop may be too near.
             free[k] = self._free(self._grid[None, i : i + 5, j : j + 5], tried[k])[0]
             if free[k]:
                 self._grid[i + 2, j + 2] = self.points[self.count] = tried[k]
                 self.count += 1
         return free
 
-    def _free(self, near: Floats, points: Floats) -> NDArray[np.bool_]:
+    def _free(self, near: Floats, points: Floats) -> Bools:
         distances = ((near - points) ** 2).sum(axis=3)
         return np.asarray((distances >= self._apart**2).all(axis=(1, 2)))
 
 
 @dataclass(frozen=True, slots=True)
 class PoissonForest(Seeded):
-    """Trees at random places that keep a distance; start and goal stand in opposite corners."""
+    """Trees at random places with a minimum distance; start and goal are in opposite corners."""
 
     radius: float | None = param(None, "radius of the trunks; auto: 0.015 of the size", above=0)
     gap: float | None = param(
         None, "least free distance from trunk to trunk; auto: 0.05 of the size", above=0
     )
 
+    trunk = Length("radius", 0.015)
+    free_gap = Length("gap", 0.05)
+
     def __post_init__(self) -> None:
         """Check that trunks fit the map, and that there are not too many."""
         Seeded.__post_init__(self)
-        if self.trunk > self.size / 2:
-            raise no_fit("radius", self.trunk, self.size / 2)
+        self.check_fits(("radius", self.trunk, self.size / 2))
         if ((self.size - 2 * self.trunk) / self.apart) ** 2 > _MOST:
             least = self.size / np.sqrt(_MOST)
             raise BrrtError(
-                f"trees {self.apart:g} apart are too many for the map; make twice the radius and "
-                f"the gap {least:g} at least"
+                f"trees {self.apart:g} apart are too many for the map; make twice the radius plus "
+                f"the gap at least {least:g}"
             )
 
     @property
-    def trunk(self) -> float:
-        """Radius of the trunks."""
-        return 0.015 * self.size if self.radius is None else self.radius
-
-    @property
     def apart(self) -> float:
-        """Distance from the middle of a trunk to that of another."""
-        return 2 * self.trunk + (0.05 * self.size if self.gap is None else self.gap)
+        """Minimum distance of the middles of two trunks."""
+        return 2 * self.trunk + self.free_gap
 
-    def trees(self, rng: np.random.Generator, ends: Query) -> Floats:
-        """Draw where the middles of the trunks are, shape (n, 2)."""
-        reach = self.trunk + CLEARANCE * self.size + ends.room
-        kept = np.stack([ends.start[:2], ends.goal[:2]])
+    def trees(self, rng: np.random.Generator, query: Query) -> Floats:
+        """Draw the middles of the trunks, shape (n, 2)."""
+        reach = self.trunk + CLEARANCE * self.size + query.room
+        kept = np.stack([query.start[:2], query.goal[:2]])
 
-        def allowed(points: Floats) -> NDArray[np.bool_]:
+        def allowed(points: Floats) -> Bools:
             distances = np.linalg.norm(points[:, None] + self.trunk - kept, axis=2)
             return np.asarray((distances > reach).all(axis=1))
 
@@ -140,19 +134,19 @@ class PoissonForest(Seeded):
 
 @dataclass(frozen=True, slots=True)
 class Forest2D(PoissonForest):
-    """Trunks, round, at random places of a square map that keep a distance (Poisson disc)."""
+    """Round trunks at random places of a square map with a minimum distance (Poisson disc)."""
 
     dim: ClassVar[int] = 2
 
-    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
         """Draw the trees."""
-        trees = self.trees(rng, ends)
+        trees = self.trees(rng, query)
         return ObstacleSet(balls=np.column_stack([trees, np.full(len(trees), self.trunk)]))
 
 
 @dataclass(frozen=True, slots=True)
 class Forest3D(PoissonForest):
-    """Upright trunks, square in section, of random heights, that keep a distance (Poisson disc).
+    """Upright square trunks of random heights with a minimum distance (Poisson disc).
 
     Worlds have no cylinders: a trunk is a box whose edges are on the circle of its radius, so that
     the gap holds.
@@ -171,9 +165,9 @@ class Forest3D(PoissonForest):
                 f"min_height {self.min_height:g} is above max_height {self.max_height:g}; swap them"
             )
 
-    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
         """Draw the trees, then their heights."""
-        trees = self.trees(rng, ends)
+        trees = self.trees(rng, query)
         heights = self.size * rng.uniform(self.min_height, self.max_height, len(trees))
         half = self.trunk / np.sqrt(2)
         return ObstacleSet(

@@ -1,29 +1,28 @@
-"""What every generator of worlds has in common: a size, a query, and that there is a way."""
+"""Base classes of world generators: size, default start and goal, and connected worlds."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import Settings, param
+from brrt.worlds.arrays import Floats
 from brrt.worlds.free_space import connected
 from brrt.worlds.world import World
 
-Floats = NDArray[np.float64]
 CLEARANCE = 0.01
-"""Distance kept between obstacles and start or goal, as a fraction of the map's size."""
+"""Distance between obstacles and start or goal, as a fraction of the world's size."""
 _MARGIN = 0.05
-"""Distance of start and goal from the walls of the map, as a fraction of its size."""
+"""Distance of start and goal from the bounds, as a fraction of the world's size."""
 _DRAWS = 100
-"""Draws of a random world before it is said to have no way."""
+"""Draws of a random world before it is considered not to be connectable."""
 
 
 class Query(NamedTuple):
-    """Where a query starts and ends, shape (d,) each, and the room that a body needs there."""
+    """Where a query starts and ends, shape (d,) each, and the distance to keep free around both."""
 
     start: Floats
     goal: Floats
@@ -31,7 +30,7 @@ class Query(NamedTuple):
 
 
 class ObstacleSet(NamedTuple):
-    """What stands in a world, and what the user should know of it; see `World`."""
+    """The obstacles of a world, and notes for the user; see `World`."""
 
     balls: Floats = np.empty((0, 0))
     boxes: Floats = np.empty((0, 0))
@@ -39,41 +38,71 @@ class ObstacleSet(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
+class Length:
+    """A length that a parameter states or that is, by default, a fraction of another length.
+
+    Args:
+        param: Name of the parameter, which is None by default.
+        fraction: The default, as a fraction.
+        of: Attribute that it is a fraction of.
+    """
+
+    def __init__(self, param: str, fraction: float, of: str = "size") -> None:
+        self._param, self._fraction, self._of = param, fraction, of
+
+    def __get__(self, generator: Any, _: Any = None) -> float:
+        stated: float | None = getattr(generator, self._param)
+        return self._fraction * getattr(generator, self._of) if stated is None else stated
+
+
 @dataclass(frozen=True, slots=True)
 class Generator(Settings):
-    """A world that reaches from 0 to `size`, a square or a cube unless it says otherwise."""
+    """A world from 0 to `size` along each axis, unless a subclass says otherwise."""
 
     dim: ClassVar[int]
 
     size: float = param(100.0, "side of the map", above=0)
-    connected: bool = param(False, "make sure that a way leads from start to goal, for a point")
+    connected: bool = param(False, "guarantee a path from start to goal for a point")
 
     @abstractmethod
-    def sceneries(self, ends: Query, /) -> Iterator[ObstacleSet]:
-        """Draw scenery after scenery, as many as there may be."""
+    def candidates(self, query: Query, /) -> Iterator[ObstacleSet]:
+        """Yield sets of obstacles; the first is used unless the world is to be connected."""
 
     def upper(self) -> Floats:
-        """Greatest corner of the bounds, shape (d,)."""
+        """Return the greatest corner of the bounds, shape (d,)."""
         return np.full(self.dim, self.size)
 
     def ends(self, room: float) -> tuple[Floats, Floats]:
-        """Return where start and goal are when nobody asks for another place.
+        """Return the default start and goal, shape (d,) each.
 
         Args:
-            room: How far a robot's body reaches.
+            room: Distance to keep free around them.
         """
-        return self.corners(room)
+        return self.opposite_corners(room)
 
-    def corners(self, room: float, most: float = 0.5) -> tuple[Floats, Floats]:
+    def opposite_corners(self, room: float, most: float = 0.5) -> tuple[Floats, Floats]:
         """Return points in opposite corners, 5 % of the size from each wall.
 
         Args:
-            room: Distance to keep from the walls, when that is more.
-            most: The distance is never more than this, as a fraction of the size.
+            room: Distance to keep from the walls if that is more.
+            most: Maximum distance from the walls, as a fraction of the size.
         """
         clearance = CLEARANCE * self.size + room
         part = max(_MARGIN, min(clearance / self.size, most) if room else 0.0)
         return np.full(self.dim, part * self.size), np.full(self.dim, (1 - part) * self.size)
+
+    def check_fits(self, *limits: tuple[str, float, float]) -> None:
+        """Check lengths against their limits.
+
+        Args:
+            limits: Parameter, its value, and the largest value that fits.
+
+        Raises:
+            BrrtError: A length is above its limit.
+        """
+        for name, value, most in limits:
+            if value > most:
+                raise BrrtError(f"{name} {value:g} does not fit the map; it is at most {most:g}")
 
     def make(
         self,
@@ -86,31 +115,31 @@ class Generator(Settings):
 
         Args:
             name: Its name.
-            start: Where the query starts, shape (d,); scattered obstacles keep off it.
-            goal: Where it ends. One that is of no use, also in a wall, is the query's to refuse.
-            room: Distance to keep free around them, beyond a clearance, for a robot's body.
+            start: Where the query starts, shape (d,); scattered obstacles keep away from it. A
+                point of another shape is ignored: the query refuses it later.
+            goal: Where the query ends.
+            room: Distance to keep free around both, in addition to the generator's clearance.
 
         Raises:
-            BrrtError: The obstacles leave no room for start and goal, or no way where there is to
-                be one.
+            BrrtError: The obstacles leave no room for start and goal, or the world is to be
+                connected and no draw is.
         """
-        own = self.ends(room)
         start, goal = (
-            mine
+            default
             if given is None or len(given) != self.dim or not np.isfinite(given).all()
             else np.asarray(given, np.float64)
-            for given, mine in zip((start, goal), own, strict=True)
+            for given, default in zip((start, goal), self.ends(room), strict=True)
         )
         lower, upper = np.zeros(self.dim), self.upper()
         draws, reason = 0, ""
         try:
-            for scenery in self.sceneries(Query(start, goal, room)):
-                world = World(name, lower, upper, start=start, goal=goal, **scenery._asdict())
+            for obstacles in self.candidates(Query(start, goal, room)):
+                world = World(name, lower, upper, start=start, goal=goal, **obstacles._asdict())
                 if not self.connected:
                     return world
                 found = connected(world, start, goal)
                 if found.connected and draws:
-                    note = f"connected asked for: draw {draws + 1} is the first with a way"
+                    note = f"connected: draw {draws + 1} is the first with a path"
                     return replace(world, notes=(*world.notes, note))
                 if found.connected:
                     return world
@@ -119,41 +148,36 @@ class Generator(Settings):
             raise BrrtError(f"world {name}: {error}") from None
         where = f" in the last of {draws} draws" if draws > 1 else ""
         raise BrrtError(
-            f"world {name}: not known to be connected ({reason}{where}); ask for fewer or smaller "
-            f"obstacles or wider openings, or give other ends"
+            f"world {name}: no path from start to goal was found ({reason}{where}); ask for fewer "
+            f"or smaller obstacles, wider openings, or another start or goal"
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Seeded(Generator):
-    """A world that is drawn from a seed."""
+    """A world that is drawn at random from a seed."""
 
-    seed: int = param(0, "seed of what is random", low=0)
+    seed: int = param(0, "seed of the random draws", low=0)
 
     @abstractmethod
-    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
-        """Draw what stands in the world."""
+    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
+        """Draw the obstacles."""
 
-    def sceneries(self, ends: Query, /) -> Iterator[ObstacleSet]:
+    def candidates(self, query: Query, /) -> Iterator[ObstacleSet]:
         """Draw from the seed itself, then from seeds derived from it."""
-        yield self.scenery(np.random.default_rng(self.seed), ends)
+        yield self.obstacles(np.random.default_rng(self.seed), query)
         for derived in np.random.SeedSequence(self.seed).spawn(_DRAWS - 1):
-            yield self.scenery(np.random.default_rng(derived), ends)
+            yield self.obstacles(np.random.default_rng(derived), query)
 
 
 @dataclass(frozen=True, slots=True)
 class Fixed(Generator):
-    """A world in which nothing is random."""
+    """A world without random draws."""
 
     @abstractmethod
-    def layout(self) -> ObstacleSet:
-        """Say what stands in the world."""
+    def obstacles(self) -> ObstacleSet:
+        """Return the obstacles."""
 
-    def sceneries(self, _ends: Query, /) -> Iterator[ObstacleSet]:
-        """There is but one."""
-        yield self.layout()
-
-
-def no_fit(name: str, value: float, most: float) -> BrrtError:
-    """Return the error for a length that is too large for the map."""
-    return BrrtError(f"{name} {value:g} does not fit the map; it is at most {most:g}")
+    def candidates(self, _query: Query, /) -> Iterator[ObstacleSet]:
+        """Yield the only candidate."""
+        yield self.obstacles()

@@ -1,30 +1,28 @@
-"""Worlds of cells and the ways between them: mazes, rooms and a spiral."""
+"""Worlds of cells and openings between them: mazes, rooms and a spiral."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
+from brrt.worlds.arrays import Bools, Floats, Ints
 from brrt.worlds.generators.box_subtraction import merge_cells
-from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet, Query, Seeded
+from brrt.worlds.generators.generator import Fixed, Length, ObstacleSet, Query, Seeded
 
-Pairs = NDArray[np.int64]
 _WALL = 0.1
-"""Thickness of the walls, as a fraction of the distance from cell to cell."""
+"""Default thickness of walls, as a fraction of the distance from cell to cell."""
 
 
-def spanning_tree(shape: tuple[int, ...], rng: np.random.Generator) -> Pairs:
-    """Draw a tree that joins all cells of a lattice: one way leads from each to each.
+def spanning_tree(shape: tuple[int, ...], rng: np.random.Generator) -> Ints:
+    """Draw a random spanning tree of a grid of cells by depth-first search.
 
-    A walk goes on to a random neighbour that was not visited, and where there is none goes back;
-    such trees have long winding branches.
+    Such trees have long winding branches.
 
     Args:
-        shape: Cells along each axis.
-        rng: Where the draws come from.
+        shape: Number of cells along each axis.
+        rng: Random number generator.
 
     Returns:
         Pairs of neighbours, as flat indices, shape (cells - 1, 2).
@@ -39,38 +37,38 @@ def spanning_tree(shape: tuple[int, ...], rng: np.random.Generator) -> Pairs:
     untried = rng.permuted(np.where(within, flat, -1), axis=1).tolist()
     visited = bytearray(len(untried))
     visited[0] = True
-    walk, pairs = [0], []
-    while walk:
-        cell = walk[-1]
+    stack, pairs = [0], []
+    while stack:
+        cell = stack[-1]
         while untried[cell]:
             other = untried[cell].pop()
             if other >= 0 and not visited[other]:
                 visited[other] = True
                 pairs.append((cell, other))
-                walk.append(other)
+                stack.append(other)
                 break
         else:
-            walk.pop()
+            stack.pop()
     return np.array(pairs, np.int64).reshape(-1, 2)
 
 
-def walls_of(shape: tuple[int, ...], pairs: Pairs, edges: Floats) -> Floats:
-    """Return the walls between cells, shape (k, 2 d), but for those between the pairs.
+def walls_between(shape: tuple[int, ...], open_pairs: Ints, edges: Floats) -> ObstacleSet:
+    """Return the walls between cells, except between some pairs.
 
     Args:
-        shape: Cells along each axis.
-        pairs: Cells with a way between them, as flat indices, shape (n, 2).
-        edges: Where cells and walls begin and end in turn, shape (2 cells,).
+        shape: Number of cells along each axis.
+        open_pairs: Neighbours without a wall between them, as flat indices, shape (n, 2).
+        edges: Where cells and walls begin and end alternately, shape (2 cells,).
     """
     blocked = np.ones([2 * n - 1 for n in shape], np.bool_)
     blocked[(slice(None, None, 2),) * len(shape)] = False
-    one, other = (np.array(np.unravel_index(cells, shape)) for cells in pairs.T)
+    one, other = (np.array(np.unravel_index(cells, shape)) for cells in open_pairs.T)
     blocked[tuple(one + other)] = False
-    return merge_cells(blocked, edges)
+    return ObstacleSet(boxes=merge_cells(blocked, edges))
 
 
 def _edges(size: float, cells: int, wall: float) -> Floats:
-    """Where cells and walls begin and end in turn, shape (2 cells,); the last ends at the size."""
+    """Return where cells and walls begin and end alternately, up to the size, (2 cells,)."""
     corridor = (size - (cells - 1) * wall) / cells
     edges = np.arange(cells)[:, None] * (corridor + wall) + [0, corridor]
     edges[-1, 1] = size
@@ -84,11 +82,13 @@ def _check_wall(size: float, cells: int, wall: float) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Maze(Seeded):
-    """A perfect maze: exactly one way leads from any cell to any other.
+class Maze2D(Seeded):
+    """A perfect maze on a square map: exactly one way leads from any cell to any other.
 
-    Start and goal stand in the middle of opposite corner cells.
+    Start and goal are in the middle of opposite corner cells.
     """
+
+    dim: ClassVar[int] = 2
 
     cells: int = param(10, "cells along each side", low=2, high=300)
     corridor: float | None = param(
@@ -114,33 +114,26 @@ class Maze(Seeded):
 
     @property
     def thickness(self) -> float:
-        """Of the walls."""
+        """Thickness of the walls."""
         if self.corridor is not None:
             return (self.size - self.cells * self.corridor) / (self.cells - 1)
         return _WALL * self.size / self.cells if self.wall is None else self.wall
 
     def ends(self, _room: float, /) -> tuple[Floats, Floats]:
-        """Return the middle of two opposite corner cells."""
+        """Return the middles of two opposite corner cells."""
         edges = _edges(self.size, self.cells, self.thickness)
         first, last = edges[:2].mean(), edges[-2:].mean()
         return np.full(self.dim, first), np.full(self.dim, last)
 
-    def scenery(self, rng: np.random.Generator, _ends: Query, /) -> ObstacleSet:
-        """Draw the ways between cells, and wall off the rest."""
+    def obstacles(self, rng: np.random.Generator, _query: Query, /) -> ObstacleSet:
+        """Draw which cells are connected, and return the other walls."""
         shape = (self.cells,) * self.dim
         edges = _edges(self.size, self.cells, self.thickness)
-        return ObstacleSet(boxes=walls_of(shape, spanning_tree(shape, rng), edges))
+        return walls_between(shape, spanning_tree(shape, rng), edges)
 
 
 @dataclass(frozen=True, slots=True)
-class Maze2D(Maze):
-    """A perfect maze on a square map: exactly one way leads from any cell to any other."""
-
-    dim: ClassVar[int] = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Maze3D(Maze):
+class Maze3D(Maze2D):
     """A perfect maze in a cube, with ways up and down as well."""
 
     dim: ClassVar[int] = 3
@@ -152,7 +145,7 @@ class Maze3D(Maze):
 class Rooms2D(Seeded):
     """Rooms in rows, with doors at random places in the walls between them.
 
-    Doors join all the rooms; some of the other walls have one too. Start and goal stand in the
+    Doors connect all the rooms; some of the other walls have one too. Start and goal are in the
     middle of opposite corner rooms.
     """
 
@@ -165,6 +158,8 @@ class Rooms2D(Seeded):
     )
     loops: float = param(0.3, "share of the walls that need no door and have one", low=0, high=1)
 
+    width = Length("door", 0.3, of="side")
+
     def __post_init__(self) -> None:
         """Check that doors and walls fit."""
         Seeded.__post_init__(self)
@@ -174,40 +169,37 @@ class Rooms2D(Seeded):
 
     @property
     def thickness(self) -> float:
-        """Of the walls."""
+        """Thickness of the walls."""
         return _WALL * self.size / self.rooms if self.wall is None else self.wall
 
     @property
     def side(self) -> float:
-        """Of a room."""
+        """Side of a room."""
         return (self.size - (self.rooms - 1) * self.thickness) / self.rooms
 
-    @property
-    def width(self) -> float:
-        """Of the doors."""
-        return 0.3 * self.side if self.door is None else self.door
-
     def ends(self, _room: float, /) -> tuple[Floats, Floats]:
-        """Return the middle of two opposite corner rooms."""
+        """Return the middles of two opposite corner rooms."""
         return np.full(2, self.side / 2), np.full(2, self.size - self.side / 2)
 
-    def scenery(self, rng: np.random.Generator, _ends: Query, /) -> ObstacleSet:
-        """Draw which walls have doors and where, and build what is left of them."""
+    def obstacles(self, rng: np.random.Generator, _query: Query, /) -> ObstacleSet:
+        """Draw which walls have doors and where, and return the rest of the walls."""
         shape = (self.rooms, self.rooms)
-        open_ = np.zeros((2, self.rooms, self.rooms), np.bool_)
+        has_door = np.zeros((2, self.rooms, self.rooms), np.bool_)
         x, y = np.unravel_index(np.sort(spanning_tree(shape, rng), axis=1).T, shape)
-        open_[np.where(x[1] > x[0], 0, 1), x[0], y[0]] = True
-        open_ |= rng.random(open_.shape) < self.loops
-        places = rng.random(open_.shape)
-        walls = [self._wall(0, i, open_[0, i], places[0, i]) for i in range(self.rooms - 1)]
-        walls += [self._wall(1, i, open_[1, :, i], places[1, :, i]) for i in range(self.rooms - 1)]
+        has_door[np.where(x[1] > x[0], 0, 1), x[0], y[0]] = True
+        has_door |= rng.random(has_door.shape) < self.loops
+        places = rng.random(has_door.shape)
+        walls = [self._wall(0, i, has_door[0, i], places[0, i]) for i in range(self.rooms - 1)]
+        walls += [
+            self._wall(1, i, has_door[1, :, i], places[1, :, i]) for i in range(self.rooms - 1)
+        ]
         return ObstacleSet(boxes=np.concatenate([np.empty((0, 4)), *walls]))
 
-    def _wall(self, axis: int, i: int, open_: NDArray[np.bool_], places: Floats) -> Floats:
-        """Return the wall behind the rooms of row i, across the map, but for its doors."""
+    def _wall(self, axis: int, i: int, has_door: Bools, places: Floats) -> Floats:
+        """Return the wall between rows i and i + 1, across the map, except for its doors."""
         pitch = self.side + self.thickness
         doors = np.arange(self.rooms) * pitch + places * (self.side - self.width)
-        doors = doors[open_]
+        doors = doors[has_door]
         begin = np.append(0.0, doors + self.width)
         end = np.append(doors, self.size)
         near = np.full(len(begin), i * pitch + self.side)
@@ -234,20 +226,20 @@ class Spiral2D(Fixed):
 
     @property
     def cells(self) -> int:
-        """Widths of the corridor across the map, with the middle."""
+        """Number of corridor widths across the map, including the middle."""
         return 2 * self.turns + 1
 
     @property
     def thickness(self) -> float:
-        """Of the walls."""
+        """Thickness of the walls."""
         return _WALL * self.size / self.cells if self.wall is None else self.wall
 
     def ends(self, _room: float, /) -> tuple[Floats, Floats]:
-        """Return the middle of the corridor where it begins, and of the map."""
+        """Return the middle of the corridor's first cell, and of the map."""
         first = _edges(self.size, self.cells, self.thickness)[:2].mean()
         return np.full(2, first), np.full(2, self.size / 2)
 
-    def layout(self) -> ObstacleSet:
+    def obstacles(self) -> ObstacleSet:
         """Walk inwards along the cells that were not visited, always turning left."""
         shape = (self.cells, self.cells)
         left = np.arange(self.cells**2).reshape(shape)
@@ -257,5 +249,4 @@ class Spiral2D(Fixed):
             left = np.rot90(left[:, 1:], -1)
         cells = np.concatenate(way)
         pairs = np.stack([cells[:-1], cells[1:]], axis=1)
-        edges = _edges(self.size, self.cells, self.thickness)
-        return ObstacleSet(boxes=walls_of(shape, pairs, edges))
+        return walls_between(shape, pairs, _edges(self.size, self.cells, self.thickness))

@@ -1,4 +1,4 @@
-"""Obstacles all over the map: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
+"""Obstacles scattered over the map: circles, boxes and polygons in 2D, spheres and boxes in 3D."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -6,66 +6,61 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.settings import param
-from brrt.worlds.generators.density import fewest
-from brrt.worlds.generators.generator import (
-    CLEARANCE,
-    Floats,
-    ObstacleSet,
-    Query,
-    Seeded,
-    no_fit,
-)
+from brrt.worlds.arrays import Bools, Floats
+from brrt.worlds.generators.density import count_for_density
+from brrt.worlds.generators.generator import CLEARANCE, ObstacleSet, Query, Seeded
 from brrt.worlds.obstacle_arrays import ObstacleArray, obstacle_arrays
 from brrt.worlds.world import World
 
 _REDRAWS = 1000
-_USUAL, _MOST = 50, 10_000_000
+_DEFAULT, _MOST = 50, 10_000_000
 _BATCHES = [256 << i for i in range(13)]
-"""Obstacles that are drawn at a time, the last number again and again, where a share of the map is
-asked for: the sequence does not depend on the share."""
+"""Sizes of the batches that are drawn for a density, the last again and again: the sequence of
+obstacles must not depend on the density."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scattered(Seeded):
-    """Obstacles spread evenly over a square or cube that reaches from 0 to `size`.
+    """Obstacles distributed uniformly over a square or cube.
 
-    Start and goal stand in opposite corners, 5 % of the size from each wall, unless asked for
-    elsewhere. An obstacle that would cover one of them is drawn anew.
+    Start and goal are in opposite corners, 5 % of the size from each wall, unless they are given.
+    Obstacles that would cover one of them are drawn again.
+
+    An obstacle is drawn as a centre and a shape: a row whose first number is the radius of a circle
+    around the obstacle, or its half extents.
     """
 
-    n: int = param(_USUAL, "number of obstacles", low=0, high=_MOST)
+    n: int = param(_DEFAULT, "number of obstacles", low=0, high=_MOST)
     density: float | None = param(
-        None, "share of the map to cover, instead of a number; auto: as n says", low=0, high=1
+        None, "share of the map to cover, instead of n; auto: n decides", low=0, high=1
     )
 
     def __post_init__(self) -> None:
-        """Check that one thing alone says how many obstacles there are."""
+        """Check that only one of n and density is given."""
         Seeded.__post_init__(self)
-        if self.density is not None and self.n != _USUAL:
-            raise BrrtError(f"n {self.n} and density {self.density:g} contradict; give one of them")
+        if self.density is not None and self.n != _DEFAULT:
+            raise BrrtError(f"n {self.n} and density {self.density:g} exclude each other; give one")
 
     @abstractmethod
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
-        """Draw n obstacles: centres, shape (n, d), and half extents, or whatever is their shape."""
+        """Draw the centres, shape (n, d), and the shapes, shape (n, k), of n obstacles."""
+
+    def covers(self, centres: Floats, shapes: Floats, point: Floats, clearance: float) -> Bools:
+        """Whether each obstacle is closer to a point than the clearance, by its radius."""
+        reach = shapes[:, 0] + clearance
+        return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
 
     @abstractmethod
-    def covers(
-        self, centres: Floats, halves: Floats, point: Floats, clearance: float
-    ) -> NDArray[np.bool_]:
-        """Whether each obstacle comes closer to a point than the clearance."""
+    def place(self, centres: Floats, shapes: Floats) -> ObstacleSet:
+        """Make obstacles from centres and shapes."""
 
-    @abstractmethod
-    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
-        """Make obstacles of what was drawn."""
-
-    def scenery(self, rng: np.random.Generator, ends: Query, /) -> ObstacleSet:
-        """Draw the obstacles: as many as asked for, or as it takes."""
+    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
+        """Draw n obstacles, or as many as the density takes."""
         if self.density is None:
-            return self.place(*self._apart(rng, self.n, ends))
+            return self.place(*self._draw_apart(rng, self.n, query))
         drawn: list[tuple[Floats, Floats]] = []
 
         def batches() -> Iterator[ObstacleArray]:
@@ -73,39 +68,44 @@ class Scattered(Seeded):
             while count < _MOST:
                 n = min(_BATCHES[min(len(drawn), len(_BATCHES) - 1)], _MOST - count)
                 count += n
-                drawn.append(self._apart(rng, n, ends))
-                scenery = self.place(*drawn[-1])._asdict()
-                yield from obstacle_arrays(World("", np.zeros(self.dim), self.upper(), **scenery))
+                drawn.append(self._draw_apart(rng, n, query))
+                placed = self.place(*drawn[-1])._asdict()
+                yield from obstacle_arrays(World("", np.zeros(self.dim), self.upper(), **placed))
 
-        count, share = fewest(self.density, self.upper(), batches(), _MOST)
-        centres, halves = (np.concatenate(parts)[:count] for parts in zip(*drawn, strict=True))
-        note = f"density {self.density:g} asked for: {count} obstacles cover {share:.4f} of the map"
-        return self.place(centres, halves)._replace(notes=(note,))
+        count, share = count_for_density(self.density, self.upper(), batches(), _MOST)
+        centres, shapes = (np.concatenate(parts)[:count] for parts in zip(*drawn, strict=True))
+        note = f"density {self.density:g}: {count} obstacles cover {share:.4f} of the map"
+        return self.place(centres, shapes)._replace(notes=(note,))
 
-    def _apart(self, rng: np.random.Generator, n: int, ends: Query) -> tuple[Floats, Floats]:
-        """Draw n obstacles that keep off start and goal."""
-        clearance = CLEARANCE * self.size + ends.room
-        centres, halves = self.draw(rng, n)
+    def _draw_apart(self, rng: np.random.Generator, n: int, query: Query) -> tuple[Floats, Floats]:
+        """Draw n obstacles that keep away from start and goal."""
+        clearance = CLEARANCE * self.size + query.room
+        centres, shapes = self.draw(rng, n)
         for _ in range(_REDRAWS):
             bad = np.zeros(n, bool)
-            for end in (ends.start, ends.goal):
-                bad |= self.covers(centres, halves, end, clearance)
+            for end in (query.start, query.goal):
+                bad |= self.covers(centres, shapes, end, clearance)
             count = int(bad.sum())
             if count == 0:
-                return centres, halves
-            centres[bad], halves[bad] = self.draw(rng, count)
+                return centres, shapes
+            centres[bad], shapes[bad] = self.draw(rng, count)
         raise BrrtError(
             f"{count} obstacles of this size leave no room for start and goal; "
             f"make them smaller or the map larger"
         )
 
-    def _centres(self, rng: np.random.Generator, halves: Floats) -> Floats:
+    def _draw_centres(self, rng: np.random.Generator, halves: Floats) -> Floats:
         return halves + (self.size - 2 * halves) * rng.random(halves.shape)
+
+    def _check_range(self, what: str, low: float, high: float, limit: float) -> None:
+        if low > high:
+            raise BrrtError(f"min_{what} {low:g} is above max_{what} {high:g}; swap them")
+        self.check_fits((f"max_{what}", high, limit))
 
 
 @dataclass(frozen=True, slots=True)
 class ScatteredBalls(Scattered):
-    """Circles or spheres with radii spread evenly over a range."""
+    """Circles or spheres with uniformly distributed radii."""
 
     min_radius: float = param(1.0, "least radius", above=0)
     max_radius: float = param(8.0, "greatest radius", above=0)
@@ -113,30 +113,22 @@ class ScatteredBalls(Scattered):
     def __post_init__(self) -> None:
         """Check the range."""
         Scattered.__post_init__(self)
-        _check_sizes("radius", self.min_radius, self.max_radius, self.size / 2)
+        self._check_range("radius", self.min_radius, self.max_radius, self.size / 2)
 
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
         """Draw radii, then centres that keep the balls inside the map."""
         radii = rng.uniform(self.min_radius, self.max_radius, n)
         halves = np.repeat(radii[:, None], self.dim, axis=1)
-        return self._centres(rng, halves), halves
+        return self._draw_centres(rng, halves), halves
 
-    def covers(
-        self, centres: Floats, halves: Floats, point: Floats, clearance: float
-    ) -> NDArray[np.bool_]:
-        """Compare the distance to the centre with radius and clearance."""
-        reach = halves[:, 0] + clearance
-        return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
-
-    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
-        """Write each ball as centre and radius."""
-        balls = np.concatenate([centres, halves[:, :1]], axis=1)
-        return ObstacleSet(balls=balls)
+    def place(self, centres: Floats, shapes: Floats) -> ObstacleSet:
+        """Make balls from centres and radii."""
+        return ObstacleSet(balls=np.concatenate([centres, shapes[:, :1]], axis=1))
 
 
 @dataclass(frozen=True, slots=True)
 class ScatteredBoxes(Scattered):
-    """Axis-aligned boxes with sides spread evenly over a range."""
+    """Axis-aligned boxes with uniformly distributed sides."""
 
     cubes: ClassVar[bool] = False
 
@@ -146,33 +138,21 @@ class ScatteredBoxes(Scattered):
     def __post_init__(self) -> None:
         """Check the range."""
         Scattered.__post_init__(self)
-        _check_sizes("side", self.min_side, self.max_side, self.size)
+        self._check_range("side", self.min_side, self.max_side, self.size)
 
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
         """Draw sides, then centres that keep the boxes inside the map."""
-        shape = (n, 1 if self.cubes else self.dim)
-        sides = rng.uniform(self.min_side, self.max_side, shape)
+        sides = rng.uniform(self.min_side, self.max_side, (n, 1 if self.cubes else self.dim))
         halves = np.array(np.broadcast_to(sides / 2, (n, self.dim)))
-        return self._centres(rng, halves), halves
+        return self._draw_centres(rng, halves), halves
 
-    def covers(
-        self, centres: Floats, halves: Floats, point: Floats, clearance: float
-    ) -> NDArray[np.bool_]:
-        """Compare the offset along each axis with half side and clearance."""
-        near = np.abs(centres - point) <= halves + clearance
-        return np.asarray(near.all(axis=1))
+    def covers(self, centres: Floats, shapes: Floats, point: Floats, clearance: float) -> Bools:
+        """Whether each box is closer to a point than the clearance along every axis."""
+        return np.asarray((np.abs(centres - point) <= shapes + clearance).all(axis=1))
 
-    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
-        """Write each box as its least and greatest corner."""
-        boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-        return ObstacleSet(boxes=boxes)
-
-
-def _check_sizes(what: str, least: float, greatest: float, limit: float) -> None:
-    if least > greatest:
-        raise BrrtError(f"min_{what} {least:g} is above max_{what} {greatest:g}; swap them")
-    if greatest > limit:
-        raise no_fit(f"max_{what}", greatest, limit)
+    def place(self, centres: Floats, shapes: Floats) -> ObstacleSet:
+        """Make boxes from centres and half sides."""
+        return ObstacleSet(boxes=np.concatenate([centres - shapes, centres + shapes], axis=1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +195,7 @@ class Spheres3D(ScatteredBalls):
 class Polygons2D(Scattered):
     """Convex polygons with their corners on circles, on a square map.
 
-    The corners are spread around the circle by 1 part each, give or take 0.3 parts.
+    The angles between corners are equal, each corner shifted by up to 0.3 of them at random.
     """
 
     dim: ClassVar[int] = 2
@@ -228,29 +208,22 @@ class Polygons2D(Scattered):
     def __post_init__(self) -> None:
         """Check the ranges."""
         Scattered.__post_init__(self)
-        _check_sizes("radius", self.min_radius, self.max_radius, self.size / 2)
-        _check_sizes("corners", self.min_corners, self.max_corners, np.inf)
+        self._check_range("radius", self.min_radius, self.max_radius, self.size / 2)
+        self._check_range("corners", self.min_corners, self.max_corners, np.inf)
 
     def draw(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
-        """Draw for each a row: radius, number of corners, angle of each corner."""
+        """Draw centres, and for each polygon a row: radius, number of corners, their angles."""
         radii = rng.uniform(self.min_radius, self.max_radius, (n, 1))
         corners = rng.integers(self.min_corners, self.max_corners + 1, (n, 1))
         steps = np.arange(self.max_corners) + rng.uniform(-0.3, 0.3, (n, self.max_corners))
         angles = 2 * np.pi * (rng.random((n, 1)) + steps / corners)
-        centres = self._centres(rng, np.repeat(radii, 2, axis=1))
+        centres = self._draw_centres(rng, np.repeat(radii, 2, axis=1))
         return centres, np.concatenate([radii, corners, angles], axis=1)
 
-    def covers(
-        self, centres: Floats, halves: Floats, point: Floats, clearance: float
-    ) -> NDArray[np.bool_]:
-        """Compare the distance to the centre with radius and clearance."""
-        reach = halves[:, 0] + clearance
-        return np.asarray(((centres - point) ** 2).sum(axis=1) <= reach**2)
-
-    def place(self, centres: Floats, halves: Floats) -> ObstacleSet:
-        """Put the corners of each polygon on its circle."""
+    def place(self, centres: Floats, shapes: Floats) -> ObstacleSet:
+        """Make polygons from centres, radii and angles."""
         polygons = []
-        for centre, (radius, corners, *angles) in zip(centres, halves, strict=True):
+        for centre, (radius, corners, *angles) in zip(centres, shapes, strict=True):
             around = np.array(angles[: int(corners)])
             polygons.append(centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1))
         return ObstacleSet(polygons=tuple(polygons))

@@ -1,4 +1,4 @@
-"""Scenes in 3D in the spirit of the classic course maps, of our own design."""
+"""Fixed 3D scenes, of our own design, in the style of the maps of a planning course."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -7,8 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from brrt.settings import param
+from brrt.worlds.arrays import Floats
 from brrt.worlds.generators.box_subtraction import subtract_box
-from brrt.worlds.generators.generator import Fixed, Floats, ObstacleSet
+from brrt.worlds.generators.generator import Fixed, ObstacleSet
 
 Point = tuple[float, float, float]
 Box = tuple[float, float, float, float, float, float]
@@ -16,7 +17,7 @@ Box = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Scene(Fixed):
-    """A scene that is given by its numbers, in percent of its longest side."""
+    """A scene whose numbers are percent of its longest side."""
 
     dim: ClassVar[int] = 3
     far: ClassVar[Point]
@@ -35,12 +36,12 @@ class Scene(Fixed):
         return np.array(self.far) * (self.size / 100)
 
     def ends(self, _room: float, /) -> tuple[Floats, Floats]:
-        """Return the places that belong to the scene."""
+        """Return the scene's own start and goal."""
         scale = self.size / 100
         return np.array(self.start) * scale, np.array(self.goal) * scale
 
-    def layout(self) -> ObstacleSet:
-        """Scale the obstacles."""
+    def obstacles(self) -> ObstacleSet:
+        """Return the scaled boxes."""
         return ObstacleSet(boxes=np.array(self.boxes(), np.float64) * (self.size / 100))
 
 
@@ -59,17 +60,16 @@ class Cube3D(Scene):
 
 @dataclass(frozen=True, slots=True)
 class Window3D(Scene):
-    """A wall with a window in it, a low wall before and a cupboard behind."""
+    """A wall with a window, a low wall before it and a cupboard behind it."""
 
     far: ClassVar[Point] = (100, 60, 50)
     start: ClassVar[Point] = (8, 48, 6)
     goal: ClassVar[Point] = (92, 24, 6)
 
     def boxes(self) -> Floats:
-        """Return the wall around the window, then what stands before and behind."""
+        """Return the wall around the window, then the low wall and the cupboard."""
         wall = subtract_box((46, 0, 0), (50, 60, 50), [(46, 18, 24), (50, 30, 36)])
-        others = [(22, 0, 0, 25, 60, 18), (62, 6, 0, 72, 42, 40)]
-        return np.concatenate([wall, others])
+        return np.concatenate([wall, [(22, 0, 0, 25, 60, 18), (62, 6, 0, 72, 42, 40)]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class Tower3D(Scene):
     goal: ClassVar[Point] = (6, 6, 95)
 
     def boxes(self) -> Floats:
-        """Return the ceilings, and a pillar through all of them."""
+        """Return a pillar through all floors, then the ceilings."""
         corners = ((27, 27), (3, 27), (27, 3), (3, 3), (27, 27), (3, 27))
         floors = [np.array([(16, 16, 0, 24, 24, 100)], np.float64)]
         for floor, (x, y) in enumerate(corners, 1):
@@ -100,7 +100,7 @@ class Room3D(Scene):
     goal: ClassVar[Point] = (96, 30, 4)
 
     def boxes(self) -> Floats:
-        """Return table, chairs, lamp, shelf, counter, wall with a door, and sofa."""
+        """Return table, chairs, lamp, shelf, counter, sofa, and the wall with a door."""
         table: list[Box] = [
             (22, 24, 7, 46, 40, 8),
             *((x, y, 0, x + 1.5, y + 1.5, 7) for x in (22, 44.5) for y in (24, 38.5)),
@@ -123,7 +123,7 @@ class Room3D(Scene):
 
 
 def _chair(x: float, y: float, *, back_first: bool) -> list[Box]:
-    """Return seat, legs and back of a chair whose seat begins at (x, y)."""
+    """Return seat, back and legs of a chair whose seat begins at (x, y)."""
     back = y if back_first else y + 5.4
     legs = [(x + i, y + j, 0.0, x + i + 0.6, y + j + 0.6, 4.2) for i in (0, 5.4) for j in (0, 5.4)]
     return [(x, y, 4.2, x + 6, y + 6, 4.8), (x, back, 4.8, x + 6, back + 0.6, 10), *legs]
@@ -138,7 +138,7 @@ class Hurdles3D(Scene):
     goal: ClassVar[Point] = (96, 12, 3)
 
     def boxes(self) -> list[Box]:
-        """Return hurdles from the floor and beams from the ceiling, of many heights."""
+        """Return hurdles on the floor and beams at the ceiling, of different heights."""
         hurdles = ((9, 10), (29, 14), (49, 16), (69, 13), (89, 9))
         beams = ((19, 5), (39, 7), (59, 4), (79, 6))
         boxes: list[Box] = [(x, 0, 0, x + 2, 24, z) for x, z in hurdles]
@@ -147,7 +147,7 @@ class Hurdles3D(Scene):
 
 @dataclass(frozen=True, slots=True)
 class Offset3D(Scene):
-    """Walls with a hole each, now on one side, now on another."""
+    """Walls with one hole each, at different places."""
 
     far: ClassVar[Point] = (100, 40, 40)
     start: ClassVar[Point] = (5, 20, 20)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.files import lines_of, read_text
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader, finite, nothing_to_choose
+from brrt.files import lines_of
+from brrt.worlds.arrays import Floats
+from brrt.worlds.loaders.loader import Loader, finite, read_world_text
 from brrt.worlds.world import World
 
 _CORNERS, _COLOUR = 6, 3
@@ -20,73 +20,56 @@ _BEGINS = re.compile(
 )
 
 _MOST_NOTES = 10
-"""Blocks outside the boundary that are named one by one."""
+"""Number of blocks outside the boundary that have a note of their own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Blocks(Loader):
     """3D maps of `boundary` and `block` lines, each with xmin ymin zmin xmax ymax zmax r g b.
 
-    Comments from `#` on, blank lines, tabs and CRLF are allowed; the colour may be left out. A
-    block may reach beyond the boundary, as blocks of real maps do; a note says so.
+    Comments from `#` on, blank lines, tabs and CRLF are allowed; the colour may be omitted. A block
+    may reach beyond the boundary, as blocks of real maps do; a note reports it.
     """
 
     endings = (".txt",)
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether the first word says so."""
+        """Whether the first word is `boundary` or `block`."""
         return _BEGINS.match(head) is not None
 
-    def load(self, path: Path, query: str) -> World:
-        """Read a map.
-
-        Raises:
-            BrrtError: A line is wrong, or there is not exactly one boundary.
-        """
-        nothing_to_choose(path, query)
-        return parse_blocks(str(path), read_text(path, "a world", MOST_BYTES))
-
-
-def parse_blocks(name: str, text: str) -> World:
-    """Read the text of a map.
-
-    Args:
-        name: Name of the world, and of the file in messages.
-        text: The file's text.
-
-    Raises:
-        BrrtError: A line is wrong, or there is not exactly one boundary.
-    """
-    boundary: list[float] | None = None
-    numbers, lines = array("d"), array("q")
-    for number, line in lines_of(name, text):
-        words = line.split("#", 1)[0].split()
-        if not words:
-            continue
-        where = f"{name}:{number}"
-        keyword = words[0].lower()
-        if keyword not in ("boundary", "block"):
-            raise BrrtError(
-                f"{where}: unknown keyword {words[0][:40]!r}; a line begins with "
-                f"'boundary' or 'block'"
-            )
-        corners = _corners(where, words[1:])
-        if keyword == "block":
-            numbers.extend(corners)
-            lines.append(number)
-        elif boundary is None:
-            boundary = corners
-        else:
-            raise BrrtError(f"{where}: a second boundary; a map has one")
-    if boundary is None:
-        raise BrrtError(f"{name}: no 'boundary' line; a map has one")
-    if any(low == high for low, high in zip(boundary[:3], boundary[3:], strict=True)):
-        raise BrrtError(f"{name}: the boundary has no volume")
-    lower, upper = np.array(boundary).reshape(2, 3)
-    boxes = np.array(numbers).reshape(-1, _CORNERS)
-    notes = tuple(_outside(name, lower, upper, boxes, lines))
-    return World(name, lower, upper, boxes=boxes, notes=notes)
+    def read(self, path: Path, _query: str, /) -> World:
+        """Read a map."""
+        name = str(path)
+        boundary: list[float] | None = None
+        numbers, lines = array("d"), array("q")
+        for number, line in lines_of(name, read_world_text(path)):
+            words = line.split("#", 1)[0].split()
+            if not words:
+                continue
+            where = f"{name}:{number}"
+            keyword = words[0].lower()
+            if keyword not in ("boundary", "block"):
+                raise BrrtError(
+                    f"{where}: unknown keyword {words[0][:40]!r}; a line begins with "
+                    f"'boundary' or 'block'"
+                )
+            corners = _corners(where, words[1:])
+            if keyword == "block":
+                numbers.extend(corners)
+                lines.append(number)
+            elif boundary is None:
+                boundary = corners
+            else:
+                raise BrrtError(f"{where}: a second boundary; a map has one")
+        if boundary is None:
+            raise BrrtError(f"{name}: no 'boundary' line; a map has one")
+        if any(low == high for low, high in zip(boundary[:3], boundary[3:], strict=True)):
+            raise BrrtError(f"{name}: the boundary has no volume")
+        lower, upper = np.array(boundary).reshape(2, 3)
+        boxes = np.array(numbers).reshape(-1, _CORNERS)
+        notes = tuple(_notes_outside(name, lower, upper, boxes, lines))
+        return World(name, lower, upper, boxes=boxes, notes=notes)
 
 
 def _corners(where: str, words: list[str]) -> list[float]:
@@ -102,14 +85,18 @@ def _corners(where: str, words: list[str]) -> list[float]:
     return numbers[:_CORNERS]
 
 
-def _outside(
-    name: str,
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    boxes: NDArray[np.float64],
-    lines: Sequence[int],
+def _notes_outside(
+    name: str, lower: Floats, upper: Floats, boxes: Floats, lines: Sequence[int]
 ) -> Iterator[str]:
-    """Say which blocks reach outside the boundary, where, and by how much."""
+    """Report which blocks reach outside the boundary, and by how much.
+
+    Args:
+        name: Name of the file.
+        lower: Least corner of the boundary.
+        upper: Greatest corner.
+        boxes: The blocks, shape (n, 6).
+        lines: Line number of each.
+    """
     beyond = np.maximum(lower - boxes[:, :3], boxes[:, 3:] - upper)
     apart = np.any((boxes[:, 3:] < lower) | (upper < boxes[:, :3]), axis=1)
     outside = np.flatnonzero((beyond > 0).any(axis=1)).tolist()
@@ -117,7 +104,7 @@ def _outside(
         by = " and ".join(
             f"{by:g} in {axis}" for axis, by in zip("xyz", beyond[i], strict=True) if by > 0
         )
-        how = "lies wholly outside" if apart[i] else "reaches outside"
+        how = "is entirely outside" if apart[i] else "reaches outside"
         yield f"{name}: block in line {lines[i]} {how} the boundary by {by}"
     if len(outside) > _MOST_NOTES:
         yield f"{name}: {len(outside) - _MOST_NOTES:,} more blocks reach outside the boundary"

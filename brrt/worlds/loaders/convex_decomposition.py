@@ -1,4 +1,4 @@
-"""Polygons cut into convex pieces, by shapely."""
+"""Convex decomposition of polygons with holes, by shapely."""
 
 from collections import deque
 
@@ -8,23 +8,24 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from brrt.errors import BrrtError
+from brrt.worlds.arrays import Floats
 
-Floats = NDArray[np.float64]
 Piece = tuple[int, ...]
 """Vertices by their numbers, counter-clockwise."""
 
 _CLEARLY = 1e-9
-"""Sine of an angle below which a corner may be straight or reflex, for all that rounding says."""
+"""Sine of a corner's angle below which rounding leaves open whether the corner is convex."""
 
 MOST_VERTICES = 30_000
-"""Of a polygon: cutting it takes seconds then, and its square as many more."""
+"""Maximum vertices of a polygon: decomposition then takes seconds, growing with their square."""
 
 
 def convex_pieces(where: str, rings: list[Floats]) -> list[Floats]:
-    """Cut a polygon into convex pieces whose vertices are its own.
+    """Decompose a polygon into convex pieces whose vertices are its own.
 
-    A convex polygon stays whole. Others are triangulated (constrained Delaunay), and triangles
-    are joined over a common edge while that gives a convex piece (Hertel and Mehlhorn 1983).
+    A convex polygon is returned as it is. Others are triangulated (constrained Delaunay), and
+    triangles are merged over common edges as long as the result is convex (Hertel and Mehlhorn
+    1983).
 
     Args:
         where: File and place, for messages.
@@ -34,7 +35,7 @@ def convex_pieces(where: str, rings: list[Floats]) -> list[Floats]:
         Pieces that touch and do not overlap, vertices counter-clockwise, shape (k, 2) each.
 
     Raises:
-        BrrtError: The polygon crosses or touches itself along a line, or has no area.
+        BrrtError: The polygon crosses itself or touches itself along a line, or has no area.
     """
     if sum(map(len, rings)) > MOST_VERTICES:
         raise BrrtError(f"{where}more than {MOST_VERTICES:,} vertices; simplify the polygon")
@@ -54,7 +55,7 @@ def convex_pieces(where: str, rings: list[Floats]) -> list[Floats]:
     turned = _turn(*corners.transpose(1, 0, 2)) < 0
     numbered = numbers.reshape(-1, 3)
     numbered[turned] = numbered[turned][:, ::-1]
-    return [vertices[list(piece)] for piece in _joined(vertices, numbered)]
+    return [vertices[list(piece)] for piece in _merge(vertices, numbered)]
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
@@ -66,26 +67,26 @@ def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _is_convex(outline: Floats) -> bool:
-    """Whether a polygon that does not cross itself turns one way alone, or not at all."""
+    """Whether a simple polygon clearly turns in one direction, or not at all, at every vertex."""
     turns = _turn(np.roll(outline, 1, axis=0), outline, np.roll(outline, -1, axis=0))
     clear = (turns == 0) | (np.abs(turns) > _CLEARLY)
     return bool(clear.all() and ((turns >= 0).all() or (turns <= 0).all()))
 
 
-def _joined(vertices: Floats, triangles: NDArray[np.intp]) -> list[Piece]:
-    """Join pieces over their common edges where the result is convex."""
+def _merge(vertices: Floats, triangles: NDArray[np.intp]) -> list[Piece]:
+    """Merge pieces over their common edges where the result is convex."""
     pieces: dict[int, Piece] = {i: tuple(t) for i, t in enumerate(triangles.tolist())}
     owner = {edge: i for i, piece in pieces.items() for edge in _edges(piece)}
     waiting = deque(edge for edge in owner if edge[0] < edge[1] and edge[::-1] in owner)
     while waiting:
         edge = waiting.popleft()
         one, other = owner[edge], owner[edge[::-1]]
-        whole = _over(pieces[one], pieces[other], edge)
-        if one == other or not _turns_left(vertices, whole, edge):
+        merged = _merge_pair(pieces[one], pieces[other], edge)
+        if one == other or not _is_convex_at(vertices, merged, edge):
             continue
         for side in _edges(pieces.pop(other)):
             owner[side] = one
-        pieces[one] = whole
+        pieces[one] = merged
     return list(pieces.values())
 
 
@@ -93,15 +94,15 @@ def _edges(piece: Piece) -> list[tuple[int, int]]:
     return list(zip(piece, (*piece[1:], piece[0]), strict=True))
 
 
-def _over(one: Piece, other: Piece, edge: tuple[int, int]) -> Piece:
-    """Walk around two pieces with a common edge, which leads from a to b in `one`."""
+def _merge_pair(one: Piece, other: Piece, edge: tuple[int, int]) -> Piece:
+    """Return the outline of two pieces with a common edge, which leads from a to b in `one`."""
     a, b = edge
     i, j = one.index(b), other.index(a)
     return (*one[i:], *one[:i], *(*other[j:], *other[:j])[1:-1])
 
 
-def _turns_left(vertices: Floats, piece: Piece, edge: tuple[int, int]) -> bool:
-    """Whether the corners at both ends of an edge that is to go are clearly convex, or straight."""
+def _is_convex_at(vertices: Floats, piece: Piece, edge: tuple[int, int]) -> bool:
+    """Whether a piece's corners at two vertices are clearly convex, or exactly straight."""
     for vertex in edge:
         i = piece.index(vertex)
         before, after = piece[i - 1], piece[(i + 1) % len(piece)]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from brrt.settings import param
-from brrt.worlds.loaders.loader import Loader, nothing_to_choose
+from brrt.worlds.loaders.loader import Loader
 from brrt.worlds.loaders.pixels import ENDINGS, MAGIC, read_pixels
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
@@ -16,11 +16,13 @@ from brrt.worlds.world import World
 class ImageMap(Loader):
     """2D maps drawn in a PNG, PGM, PBM, PPM, BMP or JPEG: dark pixels are blocked.
 
-    The lowest row of pixels lies at y = 0, the leftmost column at x = 0. Transparent pixels are
-    free, and half-transparent ones stand on a free background.
+    The lowest row of pixels is at y = 0, the leftmost column at x = 0. Transparent pixels are free;
+    partly transparent ones are drawn over a free background.
     """
 
-    threshold: float = param(0.5, "what is darker is blocked; 0 is black, 1 white", above=0, high=1)
+    threshold: float = param(
+        0.5, "darker pixels are blocked; 0 is black, 1 is white", above=0, high=1
+    )
     resolution: float = param(1.0, "side of a pixel", above=0, unit="m")
     invert: bool = param(False, "light pixels are blocked, and dark ones free")
 
@@ -28,16 +30,11 @@ class ImageMap(Loader):
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether it begins as these images do."""
+        """Whether the file begins like one of these images."""
         return head.startswith(MAGIC)
 
-    def load(self, path: Path, query: str) -> World:
-        """Read a map.
-
-        Raises:
-            BrrtError: The image is missing, broken or too large.
-        """
-        nothing_to_choose(path, query)
+    def read(self, path: Path, _query: str, /) -> World:
+        """Read a map."""
         pixels = read_pixels(path)
         free = pixels.white - pixels.grey if self.invert else pixels.grey
         blocked = free < self.threshold * pixels.white

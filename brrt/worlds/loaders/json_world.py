@@ -1,11 +1,10 @@
-"""brrt's own worlds."""
+"""Worlds in brrt's own JSON."""
 
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from brrt.files import read_text
-from brrt.worlds.loaders.loader import MOST_BYTES, Loader, nothing_to_choose
+from brrt.worlds.loaders.loader import Loader, read_world_text
 from brrt.worlds.world import World
 
 
@@ -17,16 +16,11 @@ class JsonWorld(Loader):
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether the schema stands near the beginning, where it is written."""
+        """Whether brrt's schema is named near the beginning."""
         return head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{") and bool(
             re.search(rb'"schema"\s*:\s*"brrt\.world"', head)
         )
 
-    def load(self, path: Path, query: str) -> World:
-        """Read a world.
-
-        Raises:
-            BrrtError: The text is not such a world.
-        """
-        nothing_to_choose(path, query)
-        return replace(World.from_json(read_text(path, "a world", MOST_BYTES)), name=str(path))
+    def read(self, path: Path, _query: str, /) -> World:
+        """Read a world."""
+        return replace(World.from_json(read_world_text(path)), name=str(path))

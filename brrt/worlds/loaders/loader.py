@@ -1,66 +1,82 @@
-"""What loaders of world files have in common."""
+"""Base class of the loaders of world files, and helpers to read text formats."""
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import ClassVar
 
 from brrt.errors import BrrtError
-from brrt.files import is_there
+from brrt.files import is_there, read_text
 from brrt.settings import Settings
 from brrt.worlds.arrays import GREATEST
 from brrt.worlds.world import World
 
 MOST_BYTES = 64_000_000
-"""Bytes of a text file, at most."""
+"""Maximum size of a text file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Loader(Settings):
-    """Base of the loaders; the first line of their docstrings is what users read in lists.
+    """Base class of the loaders; the first line of a loader's docstring is shown to users.
 
     Attributes:
-        endings: Endings of file names, in lower case.
-        queries: What `#` after the file chooses (`12`); empty where there is nothing to choose.
+        endings: Suffixes of file names, in lower case.
+        queries: What `#` after the file selects; empty for formats without queries.
     """
 
     endings: ClassVar[tuple[str, ...]] = ()
     queries: ClassVar[str] = ""
 
     @classmethod
+    @abstractmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether a file that begins like this is of this format."""
-        raise NotImplementedError
+        """Whether a file that begins with these bytes is of this format."""
 
     def load(self, path: Path, query: str) -> World:
         """Read a world from a file.
 
         Args:
             path: The file.
-            query: What stood behind the `#`, such as a number; empty without one.
+            query: The text after `#`, such as a number; empty if there is none.
 
         Raises:
-            BrrtError: The file cannot be read, or is not a world.
+            BrrtError: The file cannot be read or is not a world, or has no such query.
         """
-        raise NotImplementedError
+        if not self.queries:
+            refuse_query(path, query)
+        return self.read(path, query)
+
+    @abstractmethod
+    def read(self, path: Path, query: str, /) -> World:
+        """Read a world from a file; see `load`."""
 
 
-def nothing_to_choose(path: Path, query: str) -> None:
-    """Refuse a query to a file that holds none.
+def refuse_query(path: Path, query: str) -> None:
+    """Raise if there is a query, for files without queries.
 
     Raises:
         BrrtError: There is a query.
     """
     if query:
-        raise BrrtError(f"{path}: there is nothing to choose in it; leave out '#{query[:40]}'")
+        raise BrrtError(f"{path}: this file has no queries to choose from; omit '#{query[:40]}'")
+
+
+def read_world_text(path: Path) -> str:
+    """Read a text file that holds a world.
+
+    Raises:
+        BrrtError: The file cannot be read, is too large, or is not text.
+    """
+    return read_text(path, "a world", MOST_BYTES)
 
 
 def finite(where: str, words: Sequence[str]) -> list[float]:
-    """Read words as numbers.
+    """Read words as finite numbers.
 
     Raises:
-        BrrtError: One is no number, not finite, or so large that its square overflows.
+        BrrtError: A word is not a number, not finite, or beyond `GREATEST`.
     """
     try:
         numbers = [float(word) for word in words]
@@ -77,7 +93,7 @@ def whole(where: str, what: str, word: str, low: int, high: int) -> int:
     """Read a word as a whole number from `low` to `high`.
 
     Raises:
-        BrrtError: It is none.
+        BrrtError: The word is something else.
     """
     if word.isascii() and word.isdigit() and len(word) < 19 and low <= int(word) <= high:
         return int(word)
@@ -86,34 +102,34 @@ def whole(where: str, what: str, word: str, low: int, high: int) -> int:
     )
 
 
-def named_inside(where: str, path: Path, name: str, remedy: str) -> Path:
-    """Return the file that a file names; it may not lead out of that file's folder.
+def file_named_in(where: str, path: Path, name: str, remedy: str) -> Path:
+    """Return the path of a file that another file names; it must be in the same folder or below.
 
-    A link in the folder is the user's own, and is followed.
+    Symbolic links in the folder are followed: they are the user's own.
 
     Args:
-        where: File and place of the name, for messages.
-        path: The file that holds the name.
-        name: What it says.
-        remedy: How a user names such a file by hand.
+        where: File and position of the name, for messages.
+        path: The file that contains the name.
+        name: The name.
+        remedy: How the user can name such a file explicitly.
 
     Raises:
-        BrrtError: The name is absolute, or climbs with `..`.
+        BrrtError: The name is absolute or contains `..`.
     """
     parts = (*PurePosixPath(name).parts, *PureWindowsPath(name).parts)
     absolute = PurePosixPath(name).is_absolute() or PureWindowsPath(name).anchor
     if absolute or PureWindowsPath(name).drive or ".." in parts:
         raise BrrtError(
-            f"{where}: {name[:80]!r} leads out of the file's folder; if it is right, say {remedy}"
+            f"{where}: {name[:80]!r} is outside the file's folder; if it is right, give {remedy}"
         )
     return path.parent / name
 
 
-def named_by_user(path: Path, name: str) -> Path:
-    """Return the file that a user names: from where they stand or, if it is not there, beside.
+def file_named_by_user(path: Path, name: str) -> Path:
+    """Return the path of a file that the user names, relative to here or to the world file.
 
     Args:
         path: The world file.
-        name: What the user says.
+        name: The name.
     """
     return Path(name) if is_there(name) else path.parent / name

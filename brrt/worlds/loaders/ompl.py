@@ -7,24 +7,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
-from brrt.files import is_file, lines_of, read_text
+from brrt.files import is_file, lines_of
 from brrt.settings import param
+from brrt.worlds.arrays import Floats
 from brrt.worlds.loaders.loader import (
-    MOST_BYTES,
     Loader,
+    file_named_by_user,
     finite,
-    named_by_user,
-    nothing_to_choose,
+    read_world_text,
+    refuse_query,
     whole,
 )
 from brrt.worlds.world import World
 
 _ROW = rb"\d+(?:[ \t]++[-+]?[0-9.][-+.0-9eE]*+){3}\s*?(?:\n|\Z)"
 _CIRCLES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+(?:units:|x\s+y\s+r\b|" + _ROW + rb")")
-"""The unit, the header, or a row: files by hand have rows alone."""
+"""The unit, the header, or a row: files written by hand may have only rows."""
 _QUERIES = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*+\d+\s++(?:start|goal):")
 _MOST = 10**9
 
@@ -37,68 +37,59 @@ class OmplCircles(Loader):
     circles of `circle_obstacles.txt`.
     """
 
-    margin: float = param(0.0, "room between the outermost circles and the bounds", low=0)
-    obstacles: str | None = param(None, "the circles of queries, where they are not beside them")
+    margin: float = param(0.0, "distance between the outermost circles and the bounds", low=0)
+    obstacles: str | None = param(None, "file of the circles, for queries in another folder")
 
     endings = (".txt",)
     queries = "a query by its number (7), in a file of queries"
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether it begins with `units:`, the header `x y r`, a row of four, or with a query."""
+        """Whether the file begins with `units:`, `x y r`, a row of four, or a query."""
         return bool(_CIRCLES.match(head) or _QUERIES.match(head))
 
-    def load(self, path: Path, query: str) -> World:
-        """Read circles and, from a file of queries, start and goal.
-
-        Raises:
-            BrrtError: A line is wrong, there is no such query, or it lies outside the bounds.
-        """
-        text = read_text(path, "a world", MOST_BYTES)
+    def read(self, path: Path, query: str, /) -> World:
+        """Read circles and, from a file of queries, start and goal."""
+        text = read_world_text(path)
         if _QUERIES.match(text[:4096].encode()) is None:
-            nothing_to_choose(path, query)
-            return self._world(path, _circles(str(path), text), None, ())
-        number, ends, count = _query(path, text, query)
-        notes = [] if query else [f"{path}: query {number} of {count:,}; name one as {path}#7"]
-        source = self._obstacles(path)
-        circles = _circles(str(source), read_text(source, "a world", MOST_BYTES))
-        return self._world(path, circles, ends, tuple(notes))
+            refuse_query(path, query)
+            return self._make(path, _circles(str(path), text), None, ())
+        number, ends, count = _find_query(path, text, query)
+        notes = [] if query else [f"{path}: query {number} of {count:,}; choose one as {path}#7"]
+        source = self._obstacles_file(path)
+        return self._make(path, _circles(str(source), read_world_text(source)), ends, tuple(notes))
 
-    def _world(
-        self,
-        path: Path,
-        circles: NDArray[np.float64],
-        ends: NDArray[np.float64] | None,
-        notes: tuple[str, ...],
+    def _make(
+        self, path: Path, circles: Floats, ends: Floats | None, notes: tuple[str, ...]
     ) -> World:
         lower = (circles[:, :2] - circles[:, 2:]).min(axis=0) - self.margin
         upper = (circles[:, :2] + circles[:, 2:]).max(axis=0) + self.margin
         if not (lower < upper).all():
-            raise BrrtError(f"{path}: the circles span no area; give room: {path}:margin=1")
+            raise BrrtError(f"{path}: the bounds of the circles have no area; give {path}:margin=1")
         start, goal = (None, None) if ends is None else ends
         for what, end in (("start", start), ("goal", goal)):
             if end is not None and not ((lower <= end) & (end <= upper)).all():
                 raise BrrtError(
-                    f"{path}: the {what} {end[0]:g}, {end[1]:g} lies outside the bounds of the "
-                    f"circles; give room: {path}:margin=10"
+                    f"{path}: the {what} {end[0]:g}, {end[1]:g} is outside the bounds of the "
+                    f"circles; give {path}:margin=10"
                 )
         return World(str(path), lower, upper, balls=circles, start=start, goal=goal, notes=notes)
 
-    def _obstacles(self, path: Path) -> Path:
+    def _obstacles_file(self, path: Path) -> Path:
         if self.obstacles is not None:
-            return named_by_user(path, self.obstacles)
+            return file_named_by_user(path, self.obstacles)
         beside = path.with_name(path.name.replace("queries", "obstacles"))
         if beside == path or not is_file(beside):
-            missing = "" if beside == path else f" in {beside.name} beside them"
+            missing = "" if beside == path else f"; there is no {beside.name} in the folder"
             raise BrrtError(
-                f"{path}: these are queries, and their circles are not there{missing}; "
-                f"say where: {path}:obstacles=PATH"
+                f"{path}: a file of queries without its circles{missing}; "
+                f"give {path}:obstacles=PATH"
             )
         return beside
 
 
-def _circles(name: str, text: str) -> NDArray[np.float64]:
-    """Read rows of number, x, y and radius below the unit and the header."""
+def _circles(name: str, text: str) -> Floats:
+    """Read rows of number, x, y and radius after the unit and the header, if any; (n, 3)."""
     numbers = array("d")
     for number, line in lines_of(name, text):
         words = line.split()
@@ -109,15 +100,15 @@ def _circles(name: str, text: str) -> NDArray[np.float64]:
             raise BrrtError(f"{where}: {len(words)} words; there must be 4: number, x, y, radius")
         x, y, radius = finite(where, words)[1:]
         if radius < 0:
-            raise BrrtError(f"{where}: the radius {radius:g} is below zero")
+            raise BrrtError(f"{where}: the radius must be at least 0, not {radius:g}")
         numbers.extend((x, y, radius))
     if not numbers:
         raise BrrtError(f"{name}: no circles; each is a line of number, x, y, radius")
     return np.array(numbers).reshape(-1, 3)
 
 
-def _query(path: Path, text: str, query: str) -> tuple[int, NDArray[np.float64], int]:
-    """Find a query: its number, start and goal, shape (2, 2), and how many there are."""
+def _find_query(path: Path, text: str, query: str) -> tuple[int, Floats, int]:
+    """Return a query's number, its start and goal, shape (2, 2), and the number of queries."""
     wanted = whole(f"{path}#{query[:40]}", "a query", query, 0, _MOST) if query else None
     found: dict[str, list[float]] = {}
     count = 0
@@ -129,12 +120,13 @@ def _query(path: Path, text: str, query: str) -> tuple[int, NDArray[np.float64],
                 raise BrrtError(f"{where}: a second {what} of query {number}")
             found[what] = finite(where, words)
     if wanted is None or len(found) < 2:
-        there = f"there are {count:,}" if not found else f"it has {' '.join(found)} alone"
+        there = f"it has only a {next(iter(found))}" if found else f"there are {count:,}"
         raise BrrtError(f"{path}: no query {wanted}; {there}")
     return wanted, np.array([found["start"], found["goal"]]), count
 
 
 def _ends(path: Path, text: str) -> Iterator[tuple[str, int, str, list[str]]]:
+    """Yield place for messages, query, `start` or `goal`, and coordinates, line by line."""
     for line_number, line in lines_of(str(path), text):
         words = line.split()
         where = f"{path}:{line_number}"

@@ -1,4 +1,4 @@
-"""Maps of ROS's map_server: a yaml that describes an image (nav2's `map_io.cpp`)."""
+"""Maps of ROS's map_server: a YAML file that describes an image (nav2's `map_io.cpp`)."""
 
 import re
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.files import is_file
 from brrt.settings import param
-from brrt.worlds.loaders.loader import Loader, named_by_user, named_inside, nothing_to_choose
+from brrt.worlds.loaders.loader import Loader, file_named_by_user, file_named_in
 from brrt.worlds.loaders.pixels import Pixels, look_up, read_pixels
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from brrt.worlds.loaders.yaml_fields import YamlFields
 
 _MOST_BYTES = 64_000
-"""Real ones have 200."""
+"""Maximum size of the YAML file; real ones have 200 bytes."""
 
-_NEEDED = ("image", "resolution", "origin", "occupied_thresh", "free_thresh", "negate")
+_REQUIRED = ("image", "resolution", "origin", "occupied_thresh", "free_thresh", "negate")
 _MOST_NOTES = 10
 _MODES = ("trinary", "scale", "raw")
 _TRUTH = {"0": False, "false": False, "no": False, "1": True, "true": True, "yes": True}
@@ -35,7 +35,7 @@ _HALF = 50.0
 class RosMap(Loader):
     """2D maps of ROS's map_server: a yaml beside its PGM or PNG; modes trinary, scale and raw.
 
-    As nav2 reads them: a pixel's occupancy is its darkness (its lightness with `negate`); cells
+    As in nav2, a pixel's occupancy is its darkness (its lightness with `negate`); cells
     at or above `occupied_thresh` are occupied (100), those at or below `free_thresh` free (0),
     transparent ones unknown; those between are unknown too or, in mode `scale`, 1 to 99. In mode
     `raw` the pixel's value is its occupancy, and values above 100 are unknown.
@@ -43,31 +43,27 @@ class RosMap(Loader):
 
     unknown: Literal["blocked", "free"] = param("blocked", "how unknown cells count")
     occupied: float = param(
-        _HALF, "scale and raw: cells from here on are blocked", above=0, high=100, unit="%"
-    )
-    image: str | None = param(None, "the image, where it is not the one that the yaml names")
+        _HALF, "scale and raw: occupancy from which on cells are blocked", above=0, high=100,
+        unit="%",
+    )  # fmt: skip
+    image: str | None = param(None, "file of the image, instead of the one that the yaml names")
 
     endings = (".yaml", ".yml")
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether it names an image and a resolution."""
+        """Whether the fields `image` and `resolution` are there."""
         return all(
             re.search(rb"^\s*" + field + rb"\s*:", head, re.MULTILINE)
             for field in (b"image", b"resolution")
         )
 
-    def load(self, path: Path, query: str) -> World:
-        """Read a map and its image.
+    def read(self, path: Path, _query: str, /) -> World:
+        """Read a map and its image."""
+        from brrt.worlds.loaders.yaml_fields import YamlFields  # noqa: PLC0415 - yaml is slow
 
-        Raises:
-            BrrtError: A field is missing or of no use, or so is the image.
-        """
-        from brrt.worlds.loaders.yaml_fields import YamlFields  # noqa: PLC0415 - yaml is slow to import
-
-        nothing_to_choose(path, query)
         fields = YamlFields.read(path, _MOST_BYTES)
-        for name in _NEEDED:
+        for name in _REQUIRED:
             if name not in fields.nodes:
                 raise BrrtError(f"{path}: the field {name!r} is missing; a map has one")
         resolution = fields.number("resolution")
@@ -76,50 +72,50 @@ class RosMap(Loader):
         x, y, yaw = fields.numbers("origin", "x, y, yaw")
         mode, negate, (occupied, free) = _mode(fields), _negate(fields), _thresholds(fields)
         values = occupancy(self._pixels(path, fields), mode, occupied, free, negate=negate)
-        dark = values == _UNKNOWN
+        unknown = values == _UNKNOWN
         if mode == "trinary" and self.occupied != _HALF:
-            raise BrrtError(f"{path}: occupied counts in the modes scale and raw; this is trinary")
+            raise BrrtError(f"{path}: occupied is for the modes scale and raw; this is trinary")
         blocked = values >= self.occupied
         if self.unknown == "blocked":
-            blocked |= dark
+            blocked |= unknown
         grid = Grid(np.ascontiguousarray(blocked[::-1]), np.array([x, y]), resolution, yaw)
-        notes = self._notes(path, fields, int(dark.sum()), dark.size)
+        notes = self._notes(path, fields, int(unknown.sum()), unknown.size)
         return World.of_grid(str(path), grid, notes=tuple(notes))
 
-    def _notes(self, path: Path, fields: "YamlFields", dark: int, cells: int) -> Iterator[str]:
-        strange = [name for name in fields.nodes if name not in (*_NEEDED, "mode")]
-        for name in strange[:_MOST_NOTES]:
+    def _notes(self, path: Path, fields: "YamlFields", unknown: int, cells: int) -> Iterator[str]:
+        foreign = [name for name in fields.nodes if name not in (*_REQUIRED, "mode")]
+        for name in foreign[:_MOST_NOTES]:
             line = fields.nodes[name].start_mark.line + 1
-            yield f"{path}:{line}: {name[:40]!r} is no field of a map; left out"
-        if dark:
+            yield f"{path}:{line}: {name[:40]!r} is not a field of a map; ignored"
+        if unknown:
             other = "free" if self.unknown == "blocked" else "blocked"
             yield (
-                f"{path}: {dark:,} of {cells:,} cells are unknown and count as {self.unknown}; "
+                f"{path}: {unknown:,} of {cells:,} cells are unknown and count as {self.unknown}; "
                 f"{path}:unknown={other} makes them {other}"
             )
 
     def _pixels(self, path: Path, fields: "YamlFields") -> Pixels:
         if self.image is not None:
-            return read_pixels(named_by_user(path, self.image))
+            return read_pixels(file_named_by_user(path, self.image))
         where, name = fields.where("image"), fields.text("image")
         remedy = f"{path}:image=PATH"
-        image = named_inside(where, path, name, remedy)
+        image = file_named_in(where, path, name, remedy)
         if not name or not is_file(image):
-            raise BrrtError(f"{where}: there is no image {name[:80]!r} here; say where: {remedy}")
+            raise BrrtError(f"{where}: the image {name[:80]!r} does not exist; give {remedy}")
         return read_pixels(image)
 
 
 def occupancy(
     pixels: Pixels, mode: str, occupied: float, free: float, *, negate: bool
 ) -> NDArray[np.int8]:
-    """Return what a map server publishes: 0 to 100, or -1 where it is unknown.
+    """Return the occupancy that a map server publishes: 0 to 100, or -1 for unknown.
 
     Args:
         pixels: The image.
         mode: `trinary`, `scale` or `raw`.
         occupied: Darkness from which on a cell is occupied, 0 to 1.
         free: Darkness up to which a cell is free, below `occupied`.
-        negate: Lightness counts instead of darkness; not in mode raw.
+        negate: Use lightness instead of darkness; not in mode raw.
 
     Returns:
         Shape (h, w), the image's top row first.
@@ -163,8 +159,5 @@ def _negate(fields: "YamlFields") -> bool:
 def _mode(fields: "YamlFields") -> str:
     mode = fields.text("mode") if "mode" in fields.nodes else "trinary"
     if mode not in _MODES:
-        raise BrrtError(
-            f"{fields.where('mode')} must be {', '.join(_MODES[:-1])} or {_MODES[-1]}, "
-            f"not {mode[:40]!r}"
-        )
+        raise BrrtError(f"{fields.where('mode')} must be trinary, scale or raw, not {mode[:40]!r}")
     return mode

@@ -1,4 +1,4 @@
-"""Plain fields of a yaml file: read as text, never built into objects."""
+"""Fields of a YAML file as plain text and numbers; YAML objects are never constructed."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,9 +14,9 @@ _PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "bool"
 
 
 class YamlFields(NamedTuple):
-    """The fields of a yaml file as nodes, which know their lines.
+    """The top-level fields of a YAML file as nodes, which know their line numbers.
 
-    Nodes are not constructed: tags call nothing, and aliases and merges expand to nothing.
+    Nodes are not constructed, so that tags call nothing, and aliases and merges expand to nothing.
     """
 
     path: Path
@@ -27,20 +27,22 @@ class YamlFields(NamedTuple):
         """Read a file.
 
         Raises:
-            BrrtError: It cannot be read, is too long, or is no table of fields in yaml.
+            BrrtError: The file cannot be read, is too large, or is not a mapping in YAML.
         """
         text = read_text(path, "a map's yaml", most_bytes)
         try:
             root = yaml.compose(text, yaml.SafeLoader)
         except yaml.MarkedYAMLError as error:
             line = error.problem_mark.line + 1 if error.problem_mark else 1
-            raise BrrtError(f"{path}:{line}: not yaml: {error.problem}") from None
+            raise BrrtError(f"{path}:{line}: not YAML: {error.problem}") from None
         except yaml.YAMLError as error:
-            raise BrrtError(f"{path}: not yaml: {str(error).splitlines()[0][:80]}") from None
+            raise BrrtError(f"{path}: not YAML: {str(error).splitlines()[0][:80]}") from None
         except RecursionError:
-            raise BrrtError(f"{path}: not a map's yaml: it is nested too deeply") from None
+            raise BrrtError(f"{path}: not a map's YAML: it is nested too deeply") from None
         if not isinstance(root, yaml.MappingNode):
-            raise BrrtError(f"{path}: not a map's yaml: it must be fields like 'resolution: 0.05'")
+            raise BrrtError(
+                f"{path}: not a map's YAML: it must consist of fields like 'resolution: 0.05'"
+            )
         nodes: dict[str, yaml.Node] = {}
         for key, value in root.value:
             where = f"{path}:{key.start_mark.line + 1}"
@@ -63,7 +65,7 @@ class YamlFields(NamedTuple):
         return finite(self.where(name), [self.text(name)])[0]
 
     def numbers(self, name: str, what: str) -> list[float]:
-        """Return a list of finite numbers, as many as `what` has words."""
+        """Return a list of finite numbers, one for each word of `what`."""
         node, where = self.nodes[name], self.where(name)
         count = len(what.split())
         if not isinstance(node, yaml.SequenceNode) or len(node.value) != count:
