@@ -56,8 +56,8 @@ class Playback:
         self._places: dict[int, Floats] = {}
         self._changes: dict[int, TreeChanges] = {}
         for number, tree in forest(self._events, self.robot.distance).items():
-            rows = (of_tree(self._events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
-            made = TreeChanges.of(*rows)
+            edges, rewires = (self._events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
+            made = TreeChanges.of(of_tree(edges, number), of_tree(rewires, number))
             _check_parents(made, len(tree))
             self._places[number] = self.robot.places(tree.q)
             self._changes[number] = made
