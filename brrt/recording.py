@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Protocol
 
@@ -64,6 +64,13 @@ class Recording:
     def events(self) -> Events:
         """Return all events as one batch."""
         return Events.concat(self.manifest.dof, self.batches())
+
+    def until(self, **limits: int | None) -> "Recording":
+        """Return the run up to an instant, see `Events.until`, with its events in memory."""
+        events = self.events().until(**limits)
+        if any(limit is not None for limit in limits.values()):
+            return replace(self, batches=lambda: (events,), result=None, counts=None)
+        return replace(self, batches=lambda: (events,))
 
     def robot(self) -> Robot:
         """Return the robot of the run, with all its settings resolved in the world."""

@@ -1,5 +1,6 @@
-"""`brrt export`: a run for other viewers."""
+"""`brrt export`: a run in a file for other viewers."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,7 @@ def export(
     foxglove: Annotated[
         Path | None,
         typer.Option(
-            help="Write an .mcap whose 3D panel shows any instant, for Foxglove and Lichtblick.",
+            help="Write an .mcap for Foxglove and Lichtblick, whose 3D panel shows any instant.",
             metavar="OUT",
         ),
     ] = None,
@@ -27,12 +28,11 @@ def export(
         bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
-    """Write a run in a form that other viewers show.
+    """Write a run in a format of other viewers.
 
     brrt export run.mcap --foxglove viz.mcap --layout layout.json
     """
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.events import Events  # noqa: PLC0415
 
     from .outputs import check_output  # noqa: PLC0415
 
@@ -44,16 +44,14 @@ def export(
         raise BrrtError(f"--foxglove {foxglove}: is the recording; choose another name")
     recording = opened(run, partial=partial)
     with Watch(None, "reading the recording").running() as watch:
-        batches = Saved(recording, partial=partial, verb="export them")
-        events = Events.concat(recording.manifest.dof, batches)
-        from brrt.views import foxglove as viewers  # noqa: PLC0415 - costs half a second
+        batches = list(Saved(recording, partial=partial, verb="export them"))
+        from brrt.views.foxglove.export import export as export_to_foxglove  # noqa: PLC0415
 
         watch.total = 1.0
-        count = viewers.export(
-            recording,
+        count = export_to_foxglove(
+            replace(recording, batches=lambda: batches),
             foxglove,
             layout_path=layout,
-            events=events,
             progress=lambda part: watch.update(part, "writing", f"{part:.0%}"),
         )
     imported = "" if layout is None else f"; import {layout} as a layout first"

@@ -1,6 +1,7 @@
-"""`brrt plot`: pictures of runs for papers and slides, without a viewer."""
+"""`brrt plot`: figures of runs for papers and slides, without a viewer."""
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -11,10 +12,9 @@ from .instants import At, AtEvent, AtIteration, beyond, instant
 from .saved import Saved, opened
 
 if TYPE_CHECKING:
-    from brrt.views.matplotlib.history import Record
+    from brrt.recording import Recording
 
 PICTURES, ANIMATIONS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
-_VERB = "draw them"
 _LOOKS, _FILM = "Looks", "Animation"
 
 
@@ -26,15 +26,15 @@ def plot(
         Path,
         typer.Option(
             "--out",
-            help="A picture, .png, .svg or .pdf, or the run as it grows, .gif or .mp4.",
+            help="A figure, .png, .svg or .pdf, or an animation, .gif or .mp4.",
             show_default=False,
         ),
     ],
     what: Annotated[
         str | None,
         typer.Option(
-            help="tree, cost, time, several of them with commas, or all; by default the tree, and "
-            "the cost where the planner improves its path or there are several runs.",
+            help="tree, cost, time, several of them with commas, or all. Default: the tree, with "
+            "the cost if the planner improves its path; for several runs the cost.",
             show_default=False,
         ),
     ] = None,
@@ -44,7 +44,7 @@ def plot(
     against: Annotated[
         str | None,
         typer.Option(
-            help="Cost against time or iterations; time, unless a clock is logical.",
+            help="Cost against time or iterations. Default: time, unless a clock is logical.",
             rich_help_panel=_LOOKS,
             show_default=False,
         ),
@@ -52,7 +52,7 @@ def plot(
     rejects: Annotated[
         int,
         typer.Option(
-            help="Draw that many of the newest rejected extensions.",
+            help="Draw so many of the newest rejected extensions.",
             min=0,
             rich_help_panel=_LOOKS,
         ),
@@ -60,7 +60,7 @@ def plot(
     width: Annotated[
         float | None,
         typer.Option(
-            help="Width in inches; 3.3, a column, for one panel, and 6.9 for more.",
+            help="Width in inches. Default: 3.3, a column, for one panel; 6.9, a page, for more.",
             min=1.5,
             max=40,
             rich_help_panel=_LOOKS,
@@ -70,7 +70,7 @@ def plot(
     dpi: Annotated[
         int | None,
         typer.Option(
-            help="Dots per inch; 300, and 145 in animations.",
+            help="Dots per inch. Default: 300; 145 for animations.",
             min=30,
             max=1200,
             rich_help_panel=_LOOKS,
@@ -79,14 +79,19 @@ def plot(
     ] = None,
     azimuth: Annotated[
         float,
-        typer.Option(help="Camera of 3D worlds, degrees around.", rich_help_panel=_LOOKS),
+        typer.Option(
+            help="Camera of 3D worlds: degrees around the vertical.", rich_help_panel=_LOOKS
+        ),
     ] = -62.0,
     elevation: Annotated[
-        float, typer.Option(help="Camera of 3D worlds, degrees up.", rich_help_panel=_LOOKS)
+        float,
+        typer.Option(
+            help="Camera of 3D worlds: degrees above the horizon.", rich_help_panel=_LOOKS
+        ),
     ] = 28.0,
     seconds: Annotated[
         float,
-        typer.Option(help="How long it grows.", min=0.5, max=120, rich_help_panel=_FILM),
+        typer.Option(help="Duration of the animation.", min=0.5, max=120, rich_help_panel=_FILM),
     ] = 8.0,
     fps: Annotated[
         float, typer.Option(help="Frames a second.", min=1, max=60, rich_help_panel=_FILM)
@@ -96,7 +101,7 @@ def plot(
         bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
-    """Draw a run for a paper: its trees, the cost of its best path, where the time goes.
+    """Draw a run for a paper: its trees, the cost of its best path, the time of its iterations.
 
     brrt plot run.mcap --out tree.png
 
@@ -119,30 +124,31 @@ def plot(
         raise BrrtError(f"--out {picture}: an animation shows the tree of one run")
     limits = instant(at, at_event, at_iteration)
 
-    from brrt.views.matplotlib.animation import DPI, Pace, need_ffmpeg, save_animation  # noqa: PLC0415
+    from brrt.views.matplotlib.animation import DPI, need_ffmpeg, save_animation  # noqa: PLC0415
     from brrt.views.matplotlib.draw_world import need_matplotlib  # noqa: PLC0415
-    from brrt.views.matplotlib.figure import Look, save_plot  # noqa: PLC0415
+    from brrt.views.matplotlib.figure import FigureOptions, save_plot  # noqa: PLC0415
 
     need_matplotlib()
     if picture.suffix == ".mp4":
         need_ffmpeg()
-    look = Look(
+    options = FigureOptions(
         width=width, dpi=dpi or (DPI if moves else 300), rejects=rejects,
-        against=cast("Any", against),
-        azimuth=azimuth, elevation=elevation,
+        against=cast("Any", against), azimuth=azimuth, elevation=elevation,
     )  # fmt: skip
     with Watch(None, "reading").running() as watch:
-        records = _records(runs, limits, partial=partial)
+        recordings = [_load(run, limits, partial=partial) for run in runs]
         watch.update(0, "drawing", "")
         if moves:
 
-            def tell(done: int, total: int) -> None:
+            def progress(done: int, total: int) -> None:
                 watch.total = total
                 watch.update(done, "drawing", f"frame {done:,} of {total:,}")
 
-            save_animation(records[0], picture, look, Pace(seconds, fps), tell)
+            save_animation(
+                recordings[0], picture, options, seconds=seconds, fps=fps, progress=progress
+            )
         else:
-            save_plot(records, picture, panels, look)
+            save_plot(recordings, picture, panels, options, _names(runs))
     out.print(f"wrote {picture}", markup=False, soft_wrap=True)
 
 
@@ -161,23 +167,20 @@ def _panels(what: str | None) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _records(runs: list[Path], limits: dict[str, int], *, partial: bool) -> "list[Record]":
-    """Read the runs, up to the instant asked for; those of one name are told apart by folder."""
-    from brrt.events import Events  # noqa: PLC0415
-    from brrt.recording import Memory  # noqa: PLC0415
+def _load(run: Path, limits: dict[str, int], *, partial: bool) -> "Recording":
+    """Return a recording up to the instant, with its events in memory."""
+    from brrt.recording import Memory  # noqa: PLC0415 - keep --help fast
     from brrt.replay.fold import feed  # noqa: PLC0415
-    from brrt.views.matplotlib.history import Record  # noqa: PLC0415
 
-    names = Counter(run.stem for run in runs)
-    records = []
-    for run in runs:
-        recording, memory = opened(run, partial=partial), Memory()
-        end = feed(Saved(recording, partial=partial, verb=_VERB), [memory], limits)
-        if end is not None:
-            late = beyond(limits, *end)
-            if late is not None:
-                note(f"{late}; this is how it stood then")
-        name = run.stem if names[run.stem] == 1 else str(run.with_suffix(""))
-        events = Events.concat(recording.manifest.dof, memory.batches)
-        records.append(Record(name, recording.manifest, recording.world, events))
-    return records
+    recording, memory = opened(run, partial=partial), Memory()
+    end = feed(Saved(recording, partial=partial, verb="draw them"), [memory], limits)
+    late = None if end is None else beyond(limits, *end)
+    if late is not None:
+        note(f"{late}; this is how it stood then")
+    return replace(recording, batches=lambda: memory.batches)
+
+
+def _names(runs: list[Path]) -> list[str]:
+    """Return the name of each run in the legend: with its folder if several share a name."""
+    stems = Counter(run.stem for run in runs)
+    return [run.stem if stems[run.stem] == 1 else str(run.with_suffix("")) for run in runs]

@@ -1,8 +1,9 @@
-"""`brrt view`: a recording, or two, in the Rerun viewer: a window, the browser, or a picture."""
+"""`brrt view`: one recording or two in the Rerun viewer: a window, the browser or a picture."""
 
 import re
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,6 @@ from .saved import Saved, opened
 from .signals import handling_signals
 
 if TYPE_CHECKING:
-    from brrt.events import Events
     from brrt.recording import Recording
     from brrt.views.viewer.control import Cursor
 
@@ -66,9 +66,9 @@ def view(
         bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
     ] = False,
 ) -> None:
-    """Look at a recording, or at two side by side with a ring where they part.
+    """Show a recording, or two side by side with a ring where they first differ.
 
-    The window stays when the command ends.
+    The window stays open when the command ends.
 
     brrt view run.mcap
 
@@ -82,10 +82,10 @@ def view(
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
-    # Ended by a signal as by Ctrl-C, nothing that we started or wrote for a while outlives us.
+    # The handler raises, so a signal too removes the folder and ends the processes started here.
     with tempfile.TemporaryDirectory(prefix="brrt-") as folder, handling_signals(_end):
         with Watch(None, "drawing").running() as watch:
-            file, cursor, *marks = _prepare(runs, limits, Path(folder), watch, partial=partial)
+            file, cursor = _draw(runs, limits, Path(folder), watch, partial=partial)
         if web:
             _serve(file, runs, port)
             return
@@ -93,9 +93,9 @@ def view(
 
         with Watch(None, "waiting for the viewer").running():
             if screenshot is None:
-                control.show(file, cursor, *marks)
+                control.show(file, cursor)
             else:
-                control.screenshot(file, screenshot, cursor, pixels, *marks)
+                control.screenshot(file, screenshot, cursor, pixels)
         if screenshot is not None:
             out.print(f"{screenshot}: written", markup=False, soft_wrap=True)
 
@@ -110,7 +110,7 @@ def _check(
     *,
     force: bool,
 ) -> tuple[int, int]:
-    """See that the options go together; return the size of the picture."""
+    """Check the options; return the size of the picture in pixels."""
     from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
 
     from .outputs import check_output, check_window  # noqa: PLC0415
@@ -120,8 +120,8 @@ def _check(
     if web and screenshot is not None:
         raise BrrtError("give one of --web and --screenshot")
     if web and limits:
-        # Rerun 0.41 takes an instant in an address, `#when=iteration@200`, for what a catalog
-        # server has, and not for a proxy's recording or a file's: tried in Chromium.
+        # Rerun 0.41 takes an instant in an address, `#when=iteration@200`, for recordings of a
+        # catalog server only, not for those of a proxy or a file.
         raise BrrtError(
             "the web viewer opens at the start; leave --at out and drag the time slider, or "
             "take a picture of the instant with --screenshot"
@@ -142,113 +142,66 @@ def _check(
     return width, height
 
 
-def _prepare(
+def _draw(
     runs: list[Path], limits: dict[str, int], folder: Path, watch: Watch, *, partial: bool
-) -> "tuple[Path, Cursor | None, *tuple[Path, ...]]":
-    """Return an .rrd file of the runs, drawn into the folder where needed, and where to open it.
-
-    Behind them come files with more to show.
-    """
-    recordings = [opened(run, partial=partial) for run in runs]
-    logs, cut = [], False
-    for recording, run in zip(recordings, runs, strict=True):
-        watch.update(0, f"reading {run.name}", "")
-        saved = Saved(recording, partial=partial, verb="show them")
-        logs.append([batch for batch in saved if len(batch)])
-        cut = cut or saved.cut
-    _check_instant(limits, logs)
-
-    from brrt.views.viewer.control import Cursor  # noqa: PLC0415 - costs half a second
-
-    cursors = [Cursor(_TIMELINES[name], value) for name, value in limits.items()]
-    cursor = cursors[0] if cursors else None
-    if len(runs) == 2:
-        return _prepare_pair(runs, recordings, logs, folder, watch, cursor)
-    marks = _marks(recordings[0], logs[0], limits, folder)
-    if runs[0].suffix == ".rrd" and not cut:
-        return runs[0], cursor, *marks
-    file = folder / f"{runs[0].stem}.rrd"
-    _draw(recordings[0], logs[0], file, watch)
-    return file, cursor, *marks
-
-
-def _marks(
-    recording: "Recording", log: "list[Events]", limits: dict[str, int], folder: Path
-) -> list[Path]:
-    """Draw a ring around the place of the event that is asked for, if one is."""
-    from brrt.events import Events  # noqa: PLC0415
-    from brrt.views.rerun.marker import draw_mark  # noqa: PLC0415
-
-    if "seq" not in limits:
-        return []
-    mark, events = folder / "mark.rrd", Events.concat(recording.manifest.dof, log)
-    draw_mark(mark, recording.manifest, recording.world, events, limits["seq"])
-    return [mark]
-
-
-def _check_instant(limits: dict[str, int], logs: "list[list[Events]]") -> None:
-    """See that at least one of the runs lasts until the instant."""
-    from brrt.errors import BrrtError  # noqa: PLC0415
-    from brrt.events import Instant  # noqa: PLC0415
-
-    if not limits:
-        return
-    late = [
-        beyond(limits, sum(map(len, log)), log[-1].last if log else Instant(0, 0)) for log in logs
-    ]
-    if all(late):
-        raise BrrtError(f"{late[-1]}; the instant asked for comes later")
-
-
-def _draw(recording: "Recording", log: "list[Events]", file: Path, watch: Watch) -> None:
-    """Draw a recording as `brrt replay --rrd` does."""
-    from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415
-
-    sink, done = RerunSink(recording.manifest, recording.world, path=file), 0
-    watch.total = total = sum(map(len, log))
-    try:
-        for batch in log:
-            sink.write(batch)
-            done += len(batch)
-            watch.update(done, "drawing", f"{done:,} of {total:,} events")
-    finally:
-        sink.close(recording.result)
-
-
-def _prepare_pair(
-    runs: list[Path],
-    recordings: "list[Recording]",
-    logs: "list[list[Events]]",
-    folder: Path,
-    watch: Watch,
-    cursor: "Cursor | None",
 ) -> "tuple[Path, Cursor | None]":
-    """Draw two runs; where nothing else is asked for, they open where they part."""
-    from brrt.events import Events  # noqa: PLC0415
-    from brrt.views.rerun.pair import Side, draw_pair  # noqa: PLC0415
+    """Return an .rrd file of the runs, drawn into the folder if needed, and where to open it."""
+    recordings = []
+    for run in runs:
+        watch.update(0, f"reading {run.name}", "")
+        recordings.append(_load(run, partial=partial))
+    _check_instant(limits, recordings)
+    from brrt.views.rerun.drawing import draw_run  # noqa: PLC0415 - costs half a second
+    from brrt.views.rerun.pair import draw_pair  # noqa: PLC0415
     from brrt.views.viewer.control import Cursor  # noqa: PLC0415
 
-    watch.update(0, "drawing both runs", "")
-    sides = [
-        Side(
-            run.name,
-            recording.manifest,
-            recording.world,
-            Events.concat(recording.manifest.dof, log),
-        )
-        for run, recording, log in zip(runs, recordings, logs, strict=True)
-    ]
-    file = folder / "pair.rrd"
-    difference = draw_pair(file, *sides)
-    told = "are equal, event by event" if difference is None else f"part at {difference}"
-    out.print(f"{runs[0]} and {runs[1]} {told}", markup=False, soft_wrap=True)
-    if cursor is None and difference is not None:
-        cursor = Cursor("event", difference.seq)
+    cursors = [Cursor(_TIMELINES[name], value) for name, value in limits.items()]
+    cursor, file = cursors[0] if cursors else None, folder / f"{runs[0].stem}.rrd"
+    if len(runs) == 2:
+        watch.update(0, "drawing both runs", "")
+        difference = draw_pair(file, *recordings)
+        result = "are equal, event by event" if difference is None else f"part at {difference}"
+        out.print(f"{runs[0]} and {runs[1]} {result}", markup=False, soft_wrap=True)
+        if cursor is None and difference is not None:
+            cursor = Cursor("event", difference.seq)
+        return file, cursor
+    ring = limits.get("seq")
+    if runs[0].suffix == ".rrd" and ring is None and recordings[0].result is not None:
+        return runs[0], cursor
+    watch.total = total = sum(map(len, recordings[0].batches()))
+    draw_run(
+        file,
+        recordings[0],
+        ring=ring,
+        progress=lambda done: watch.update(done, "drawing", f"{done:,} of {total:,} events"),
+    )
     return file, cursor
 
 
+def _load(run: Path, *, partial: bool) -> "Recording":
+    """Return a recording with its events in memory."""
+    recording = opened(run, partial=partial)
+    saved = Saved(recording, partial=partial, verb="show them")
+    batches = [batch for batch in saved if len(batch)]
+    return replace(recording, batches=lambda: batches)
+
+
+def _check_instant(limits: dict[str, int], recordings: "list[Recording]") -> None:
+    """Check that at least one of the runs lasts until the instant."""
+    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.events import Instant  # noqa: PLC0415
+
+    ends = []
+    for recording in recordings:
+        log = list(recording.batches())
+        last = log[-1].last if log else Instant(0, 0)
+        ends.append(beyond(limits, sum(map(len, log)), last))
+    if all(ends):
+        raise BrrtError(f"{ends[-1]}; the instant asked for comes later")
+
+
 def _serve(file: Path, runs: list[Path], port: int | None) -> None:
-    from brrt.views.viewer.web import Server  # noqa: PLC0415
+    from brrt.views.viewer.web import Server  # noqa: PLC0415 - costs half a second
 
     server = Server(file, port)
     try:

@@ -205,11 +205,11 @@ def _sketch(world: "World") -> Any:
 
 def _write(world: "World", picture: Path | None, rrd: Path | None, *, view: bool) -> None:
     if picture is not None:
-        from brrt.views.matplotlib.draw_world import save_picture  # noqa: PLC0415 - matplotlib is an extra
+        from brrt.views.matplotlib.draw_world import save_world  # noqa: PLC0415 - matplotlib is an extra
 
-        save_picture(world, picture)
+        save_world(world, picture)
     if rrd is not None or view:
-        from brrt.views.rerun.show_world import show_world  # noqa: PLC0415 - costs half a second
+        from brrt.views.rerun.draw_world import show_world  # noqa: PLC0415 - costs half a second
 
         show_world(world, path=rrd, view=view)
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from brrt import Events, Manifest, Memory, Metrics, Run, Scenario
+from brrt import Events, Manifest, Memory, Metrics, RecordingError, Run, Scenario
 
 pytest_plugins = ["pytester"]
 
@@ -76,6 +76,26 @@ def shell(tmp_path: Path) -> Callable[..., Result]:
         return Result(done.returncode, done.stdout, done.stderr)
 
     return call
+
+
+@cache
+def _viewer_error() -> str | None:
+    """Return why Rerun's viewer cannot run without a window, if it cannot."""
+    from brrt.views.viewer.control import headless
+
+    try:
+        with headless((200, 200)):
+            return None
+    except RecordingError as error:
+        return str(error)
+
+
+@pytest.fixture
+def viewer() -> None:
+    """Skip a test where Rerun's viewer cannot run without a window."""
+    reason = _viewer_error()
+    if reason is not None:
+        pytest.skip(reason)
 
 
 @cache

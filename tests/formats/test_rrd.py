@@ -28,10 +28,11 @@ from brrt.formats.rrd.frames import FRAME
 from brrt.formats.rrd.outline import Outline
 from brrt.formats.rrd.reader import read_rerun
 from brrt.recording import Memory
+from brrt.views import colours
 from brrt.views.rerun import layout, sink
 from brrt.views.rerun.arrow import event_columns, time_columns, to_arrow
 from brrt.views.rerun.draw import canvas, decimate, trees
-from brrt.views.rerun.sink import RerunSink, recording_id
+from brrt.views.rerun.sink import RerunSink
 from brrt.views.viewer import process
 from tests.conftest import result_of
 
@@ -300,10 +301,10 @@ def test_trees_have_names_and_colours(tmp_path: Path) -> None:
         1,
         1,
     ]
-    (_, blue), (_, red) = layout.tree_style(0), layout.tree_style(1)
+    (_, blue), (_, red) = colours.tree_style(0), colours.tree_style(1)
     assert blue[2] == max(blue)
     assert red[0] == max(red)
-    assert layout.path_style(Stage.RAW) != layout.path_style(Stage.SMOOTHED)
+    assert colours.path_style(Stage.RAW) != colours.path_style(Stage.SMOOTHED)
 
 
 @given(first=st.integers(0, 200_000), counts=st.lists(st.integers(1, 5000), min_size=1))
@@ -322,7 +323,7 @@ def test_name_of_a_recording() -> None:
     """Runs that are equal have one, others another."""
     a, b = (Run(SCENARIOS["2d"]).manifest for _ in range(2))
     other = Run(Scenario(world="circles2d:n=30", seed=8, clock="logical")).manifest
-    assert recording_id(a) == recording_id(b) != recording_id(other)
+    assert layout.recording_id(a) == layout.recording_id(b) != layout.recording_id(other)
 
 
 def test_run_that_did_not_end(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a picture shows: pixels by their colour, and where the world's frame lies in it."""
+"""Pixels of a picture by their colour, and the frame of the world in it."""
 
 import io
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ def opened(png: bytes) -> NDArray[np.int64]:
 
 
 def of_colour(picture: NDArray[np.int64], colour: Colour, tolerance: int = 12) -> Mask:
-    """Tell which pixels have a colour, but for rounding."""
+    """Return which pixels have a colour, up to a tolerance."""
     return np.asarray((np.abs(picture - colour) <= tolerance).all(axis=-1))
 
 
 def near(mask: Mask, reach: int) -> Mask:
-    """Tell which pixels have one of the mask within a square around them."""
+    """Return which pixels have one of the mask in a square around them."""
     grown = mask.copy()
     for axis in (0, 1):
         rows = grown.copy()
@@ -37,7 +37,7 @@ def near(mask: Mask, reach: int) -> Mask:
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a world of two dimensions lies in a picture: the pixels of its corners."""
+    """Where a 2D world is in a picture: the pixels of its edges."""
 
     world: World
     left: float
@@ -53,11 +53,20 @@ class Frame:
         return np.rint(np.stack([row, column], axis=1)).astype(np.int64)
 
 
-def frame(picture: NDArray[np.int64], world: World) -> Frame:
-    """Find the outline of the world, which nothing but long straight lines has the colour of."""
-    outline = of_colour(picture, OUTLINE, 8)
+def frame(
+    picture: NDArray[np.int64], world: World, tolerance: int = 8, share: float = 0.5
+) -> Frame:
+    """Find the outline of the world: no other straight lines of its colour are as long.
+
+    Args:
+        picture: The picture, shape (rows, columns, 3).
+        world: The world in it.
+        tolerance: See `of_colour`.
+        share: Least length of a line as a part of the longest one.
+    """
+    outline = of_colour(picture, OUTLINE, tolerance)
     columns, rows = outline.sum(axis=0), outline.sum(axis=1)
-    across, down = (np.flatnonzero(count > count.max() / 2) for count in (columns, rows))
+    across, down = (np.flatnonzero(count > share * count.max()) for count in (columns, rows))
     middle = [(line.min() + line.max()) / 2 for line in (across, down)]
     edges = [
         float(part.mean())

@@ -1,4 +1,4 @@
-"""A layout that Foxglove and Lichtblick import: one 3D panel with everything in sight."""
+"""A layout that Foxglove and Lichtblick import: one 3D panel that shows all topics."""
 
 import json
 from collections.abc import Iterable
@@ -14,9 +14,9 @@ _FIELD_OF_VIEW = 45.0
 
 
 def layout(world: World, topics: Iterable[str]) -> str:
-    """Return the layout of a run's export as JSON.
+    """Return the layout for a run's export as JSON.
 
-    Topics are hidden in a 3D panel until a layout, or a click for each, shows them.
+    A 3D panel hides topics until a layout, or a click for each, shows them.
 
     Args:
         world: The run's.
@@ -46,7 +46,7 @@ def layout(world: World, topics: Iterable[str]) -> str:
 
 
 def _camera(world: World) -> dict[str, Any]:
-    """Look at the whole world: at a 2D one from above, with x to the right and y up."""
+    """Return a camera that shows the whole world; in 2D from above, x to the right and y up."""
     middle = [*((world.lower + world.upper) / 2).tolist(), 0.0][:3]
     flat = world.dim == 2
     distance = (1.1 if flat else 2.2) * world.extent

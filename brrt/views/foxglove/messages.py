@@ -1,7 +1,7 @@
 """ROS 2 messages that Foxglove, Lichtblick and rviz draw, in CDR.
 
-The definitions are those of visualization_msgs and nav_msgs as of ROS 2 Foxy; later ones have more
-fields for textures. The file holds them, so that readers go by these.
+The definitions are those of visualization_msgs and nav_msgs of ROS 2 Foxy; later ones have more
+fields for textures. The file contains the definitions, so readers use these.
 """
 
 import struct
@@ -18,7 +18,7 @@ from brrt.views.colours import Colour
 from brrt.worlds.occupancy import Grid
 
 FRAME = "world"
-"""The only frame; without transforms, all of it stands still."""
+"""The only frame; there are no transforms."""
 
 _HEADER = """
 MSG: std_msgs/Header
@@ -91,11 +91,11 @@ DEFINITIONS = {
     ),
     MAP: _RULE.join([_GRID, _HEADER, _TIME, _INFO, _POSE, _POINT, _QUATERNION]),
 }
-"""Text of the definition of each type of message."""
+"""The definition of each type of message."""
 
 
-class Shape(IntEnum):
-    """What a marker is, as visualization_msgs numbers it."""
+class MarkerType(IntEnum):
+    """Types of markers, as visualization_msgs numbers them."""
 
     CUBE = 1
     SPHERE = 2
@@ -112,18 +112,18 @@ class Marker:
     """Something to draw.
 
     Attributes:
-        shape: What it is.
+        type: What it is.
         colour: Its colour.
         scale: Its size along each axis; the first is the width of lines.
-        points: Of a list or a line, shape (n, d); in 2D they lie at height `z`.
-        place: Of anything else: where its middle is, shape (d,).
-        colours: Of each point, from 0 to 1 with alpha, shape (n, 4); `colour` for all by default.
-        text: To be written.
+        points: Points of a list or a line, shape (n, d); in 2D they lie at height `z`.
+        place: Centre of any other type, shape (d,).
+        colours: RGBA of each point, from 0 to 1, shape (n, 4); `colour` for all by default.
+        text: The text of a text marker.
         z: Height in a 2D world.
         alpha: From 0, transparent, to 1.
     """
 
-    shape: Shape
+    type: MarkerType
     colour: Colour
     scale: tuple[float, float, float]
     points: NDArray[Any] | None = None
@@ -134,7 +134,7 @@ class Marker:
     alpha: float = 1.0
 
     def message(self) -> bytes:
-        """Return the marker as a message of its own; one without points takes it away."""
+        """Return the marker as a message; a list without points deletes it."""
         body = _Body(_head(self._style()))
         self._put_rest(body)
         return bytes(body.data)
@@ -142,10 +142,10 @@ class Marker:
     def _style(self) -> "_Style":
         gone = self.points is not None and not len(self.points)
         place = _space(self.place, self.z)
-        return _Style(self.shape, gone, place, self.scale, self.colour, self.alpha)
+        return _Style(self.type, gone, place, self.scale, self.colour, self.alpha)
 
     def _put_rest(self, body: "_Body") -> None:
-        """Append what differs among the many states of one drawing."""
+        """Append what differs between the many states of one marker."""
         points = np.empty((0, 3)) if self.points is None else self.points
         body.rows(_heights(points, self.z), "<f8")
         body.rows(np.empty((0, 4)) if self.colours is None else self.colours, "<f4")
@@ -154,18 +154,18 @@ class Marker:
         body.put("?", False)
 
 
-def array(markers: Sequence[Marker]) -> bytes:
+def marker_array(markers: Sequence[Marker]) -> bytes:
     """Return markers as one message."""
     body = _Body()
     body.put("I", len(markers))
     for number, marker in enumerate(markers):
-        _put_style(body, marker._style(), number)  # noqa: SLF001 - its other form
+        _put_style(body, marker._style(), number)  # noqa: SLF001 - the other form of the same type
         marker._put_rest(body)  # noqa: SLF001
     return bytes(body.data)
 
 
 def occupancy(grid: Grid, z: float) -> bytes:
-    """Return a map at a height as a message: 100 for blocked cells, 0 for free ones."""
+    """Return a grid at a height as a message: 100 for blocked cells, 0 for free ones."""
     body = _Body()
     body.header()
     body.put("iI", 0, 0)
@@ -179,9 +179,9 @@ def occupancy(grid: Grid, z: float) -> bytes:
 
 
 class _Style(NamedTuple):
-    """What stays the same while a drawing grows."""
+    """What stays the same in all states of a marker."""
 
-    shape: Shape
+    type: MarkerType
     gone: bool
     place: tuple[float, float, float]
     scale: tuple[float, float, float]
@@ -190,18 +190,18 @@ class _Style(NamedTuple):
 
 
 class _Body:
-    """A message as it grows: each number is aligned to its own size from after the header on."""
+    """A message that is being written: numbers are aligned to their size, counted after byte 4."""
 
     def __init__(self, data: bytes = b"\x00\x01\x00\x00") -> None:
         self.data = bytearray(data)
 
     def put(self, codes: str, *values: Any) -> None:
-        """Append numbers of one size, and after them perhaps smaller ones, as struct names them."""
+        """Append numbers in the format `codes` of `struct`; none may be larger than the first."""
         self._align(struct.calcsize(codes.lstrip("0123456789")[0]))
         self.data += struct.pack("<" + codes, *values)
 
     def header(self) -> None:
-        """Append a header; its stamp of 0 says that no transforms of some time are wanted."""
+        """Append a header; a stamp of 0 asks for no transforms of a certain time."""
         self.put("iI", 0, 0)
         self.text(FRAME)
 
@@ -233,7 +233,7 @@ def _head(style: _Style) -> bytes:
 def _put_style(body: _Body, style: _Style, number: int) -> None:
     body.header()
     body.text("")
-    body.put("iii", number, style.shape, 2 if style.gone else 0)
+    body.put("iii", number, style.type, 2 if style.gone else 0)
     body.put("7d", *style.place, 0, 0, 0, 1)
     body.put("3d", *style.scale)
     body.put("4f", *(part / 255 for part in style.colour), style.alpha)
@@ -241,11 +241,11 @@ def _put_style(body: _Body, style: _Style, number: int) -> None:
 
 
 def _space(place: NDArray[Any] | None, z: float) -> tuple[float, float, float]:
-    """Return a place in 3D."""
+    """Return a place as a point in 3D."""
     x, y, *rest = (0.0, 0.0, 0.0) if place is None else place.tolist()
     return (x, y, *rest)[:3] if rest else (x, y, z)
 
 
 def _heights(points: NDArray[Any], z: float) -> NDArray[Any]:
-    """Return points, shape (..., d), in 3D."""
+    """Return points, shape (n, d), in 3D."""
     return np.insert(points, 2, z, axis=1) if points.shape[1] == 2 else points

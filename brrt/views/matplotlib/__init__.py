@@ -1,1 +1,1 @@
-"""Pictures of runs by matplotlib, on white paper: trees, curves, and trees as they grow."""
+"""Figures of runs by matplotlib, on white paper: trees, curves and animations."""

@@ -1,11 +1,10 @@
-"""A run as it grows, as a .gif by Pillow or an .mp4 by ffmpeg."""
+"""An animation of a run: a .gif by Pillow or an .mp4 by ffmpeg."""
 
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,82 +14,73 @@ from PIL import Image
 
 from brrt.errors import BrrtError
 from brrt.files import replacing
-from brrt.views.colours import OBSTACLE, OBSTACLE_3D
+from brrt.recording import Recording
+from brrt.views.colours import OBSTACLE, OBSTACLE_3D, rgb
 from brrt.views.matplotlib import style
-from brrt.views.matplotlib.draw_world import need_matplotlib, rgb
-from brrt.views.matplotlib.figure import Look, explain, height_of_tree, tree_panel
-from brrt.views.matplotlib.history import History, Record
-from brrt.views.matplotlib.tree import TreePanel
+from brrt.views.matplotlib.draw_world import need_matplotlib
+from brrt.views.matplotlib.figure import FigureOptions, add_legend, height_of_tree, tree_panel
+from brrt.views.matplotlib.playback import Playback
+from brrt.views.matplotlib.tree_panel import TreePanel
 
 Pixels = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
-"""Is told how many frames are done, and of how many."""
+"""Gets the number of finished frames and of all frames."""
 
 DPI = 145
-"""Of animations: a column's width then has 480 pixels."""
+"""Of animations: the width of a column then has 480 pixels."""
 _MOST_PIXELS = 2048
 _PLANNING = 0.85
-"""Part of the frames in which the planner is at work, where anything happens afterwards."""
+"""Part of the frames for planning, if there are events after it."""
 _HOLD_S = 1.5
-"""How long the last frame stays."""
+"""Additional time of the last frame."""
 _FEWEST_FRAMES, _MOST_EDGES = 24, 2_000_000
-"""Edges drawn over all frames, about: beyond that there are fewer frames, of the same seconds."""
+"""Edges drawn in all frames, about: larger trees get fewer frames in the same time."""
 _MOST_BYTES = 5_000_000
-"""Of a .gif; one that is larger loses frames."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pace:
-    """How fast a run is shown.
-
-    Attributes:
-        seconds: How long it takes.
-        fps: Frames a second.
-    """
-
-    seconds: float = 8.0
-    fps: float = 20.0
+"""Of a .gif; frames of a larger one are dropped."""
 
 
 def save_animation(
-    record: Record,
+    recording: Recording,
     path: Path,
-    look: Look | None = None,
-    pace: Pace | None = None,
-    progress: Progress = lambda done, total: None,  # noqa: ARG005 - nobody asked
+    options: FigureOptions | None = None,
+    *,
+    seconds: float = 8.0,
+    fps: float = 20.0,
+    progress: Progress = lambda done, total: None,  # noqa: ARG005 - does nothing by default
 ) -> None:
     """Draw a run as it grows into a .gif or .mp4 file; equal runs give equal files.
 
     Args:
-        record: The run.
-        path: The file; it appears under its name when it is whole.
-        look: How it is drawn.
-        pace: How fast.
-        progress: Is told how far the work is.
+        recording: The run.
+        path: The file; it appears once it is complete.
+        options: How it is drawn.
+        seconds: Duration, without the additional time of the last frame.
+        fps: Frames a second.
+        progress: Gets the number of finished frames and of all frames.
 
     Raises:
-        BrrtError: matplotlib or, for .mp4, ffmpeg is missing or fails, the picture is too large,
+        BrrtError: matplotlib or, for .mp4, ffmpeg is missing or fails, the figure is too large,
             or the file cannot be written.
     """
-    look, pace = look or Look(dpi=DPI), pace or Pace()
+    options, recording = options or FigureOptions(dpi=DPI), recording.until()
     need_matplotlib()
     write = _write_gif
     if path.suffix == ".mp4":
         write = _write_mp4
         need_ffmpeg()
     with style.paper():
-        panel, canvas = _stage(record, look)
-        seqs, seconds = instants(panel.history, pace)
+        panel, canvas = _stage(recording, options)
+        seqs, durations = frame_times(panel.playback, seconds, fps)
         frames = _frames(panel, canvas, seqs, progress)
         with replacing(path) as unfinished:
-            write(frames, seconds, unfinished)
+            write(frames, durations, unfinished)
 
 
 def need_ffmpeg() -> str:
-    """Return where ffmpeg is.
+    """Return the path of ffmpeg.
 
     Raises:
-        BrrtError: It is nowhere.
+        BrrtError: It is not installed.
     """
     found = shutil.which("ffmpeg")
     if found is None:
@@ -100,44 +90,45 @@ def need_ffmpeg() -> str:
     return found
 
 
-def instants(history: History, pace: Pace) -> tuple[NDArray[np.int64], list[float]]:
-    """Choose the events after which a frame is drawn, and how long each is seen, in seconds.
+def frame_times(
+    playback: Playback, seconds: float, fps: float
+) -> tuple[NDArray[np.int64], list[float]]:
+    """Return the event after which each frame is drawn, and its duration in seconds.
 
-    The number of events rises as the square of the time, so that the first ones are seen one by
-    one; what comes after planning gets a part of its own.
+    During planning the number of events grows with the square of the time, so that the first events
+    are visible one by one.
     """
-    wanted = max(3, round(pace.seconds * pace.fps))
-    nodes = history.nodes(history.last)
-    most = max(_FEWEST_FRAMES, 2 * _MOST_EDGES // max(nodes, 1))
-    frames = min(wanted, most)
-    last, planned = history.last, history.planned
+    wanted = max(3, round(seconds * fps))
+    last, planned = playback.last, playback.planned
+    most = 2 * _MOST_EDGES // max(playback.nodes(last), 1)
+    frames = min(wanted, max(_FEWEST_FRAMES, most))
     after = last > planned
     growing = max(2, int(frames * _PLANNING)) if after else frames
     seqs = np.linspace(0, 1, growing) ** 2 * planned
     if after:
         seqs = np.concatenate([seqs, np.linspace(planned, last, frames - growing + 1)[1:]])
     chosen = np.round(seqs).astype(np.int64)
-    shown = [pace.seconds / len(chosen)] * len(chosen)
-    shown[-1] += _HOLD_S
-    return chosen, shown
+    durations = [seconds / len(chosen)] * len(chosen)
+    durations[-1] += _HOLD_S
+    return chosen, durations
 
 
-def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
-    """Draw what never changes; return the panel, and the canvas that holds it."""
+def _stage(recording: Recording, options: FigureOptions) -> tuple[TreePanel, Any]:
+    """Draw what never changes; return the panel and its canvas."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    width = look.width or style.COLUMN_IN + 0.01
-    size = width, height_of_tree(record, width)
-    if max(size) * look.dpi > _MOST_PIXELS:
+    width = options.width or style.COLUMN_IN + 0.01
+    size = width, height_of_tree(recording, width)
+    if max(size) * options.dpi > _MOST_PIXELS:
         raise BrrtError(
-            f"{max(size) * look.dpi:.0f} pixels are too many for an animation, which has at most "
-            f"{_MOST_PIXELS}; give a smaller --width or --dpi"
+            f"{max(size) * options.dpi:.0f} pixels are too many for an animation, which has at "
+            f"most {_MOST_PIXELS}; give a smaller --width or --dpi"
         )
-    figure = Figure(figsize=size, dpi=look.dpi, layout="constrained")
+    figure = Figure(figsize=size, dpi=options.dpi, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)
-    panel = tree_panel(figure, record, look)
-    explain(figure, panel, _marks(panel))
+    panel = tree_panel(figure, recording, options)
+    add_legend(figure, panel, _legend(panel))
     canvas.draw()
     figure.set_layout_engine("none")
     for artist in panel.drawn_last:
@@ -146,23 +137,23 @@ def _stage(record: Record, look: Look) -> tuple[TreePanel, Any]:
     return panel, canvas
 
 
-def _marks(panel: TreePanel) -> list[Any]:
-    """Return what a legend has to name of all that comes; a robot has arrived at the end."""
-    marks: list[Any] = []
-    for seq in (panel.history.planned, panel.history.last):
+def _legend(panel: TreePanel) -> list[Any]:
+    """Return the artists that any frame shows; at the end a robot is hidden by the goal."""
+    artists: list[Any] = []
+    for seq in (panel.playback.planned, panel.playback.last):
         panel.show(seq)
-        marks += [mark for mark in panel.legend() if mark not in marks]
-    return marks
+        artists += [artist for artist in panel.legend() if artist not in artists]
+    return artists
 
 
 def _frames(
     panel: TreePanel, canvas: Any, seqs: NDArray[np.int64], progress: Progress
 ) -> Iterator[Pixels]:
-    """Yield a picture after each of the events, shape (height, width, 3), both even."""
+    """Yield a frame after each of the events, shape (height, width, 3) with even sides."""
     ax = canvas.figure.axes[0]
-    ground = canvas.copy_from_bbox(canvas.figure.bbox)
+    background = canvas.copy_from_bbox(canvas.figure.bbox)
     for number, seq in enumerate(seqs.tolist()):
-        canvas.restore_region(ground)
+        canvas.restore_region(background)
         panel.show(seq)
         for artist in panel.drawn_last:
             if hasattr(artist, "do_3d_projection"):
@@ -174,66 +165,66 @@ def _frames(
         progress(number + 1, len(seqs))
 
 
-def _write_gif(frames: Iterator[Pixels], seconds: list[float], path: Path) -> None:
-    """Write frames in the colours that pictures are made of, leaving some out of a large file."""
+def _write_gif(frames: Iterator[Pixels], durations: list[float], path: Path) -> None:
+    """Write frames with a fixed palette; drop some if the file is too large."""
     palette = Image.new("P", (1, 1))
     palette.putpalette(_palette().tobytes())
-    plain = [
+    images = [
         Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
         for frame in frames
     ]
-    ends = np.round(100 * np.cumsum(seconds)).astype(int)  # a .gif counts hundredths
-    kept = np.arange(len(plain))
+    ends = np.round(100 * np.cumsum(durations)).astype(int)  # a .gif counts hundredths
+    kept = np.arange(len(images))
     while True:
-        # Each frame stays until the next one, the last one of all to the end.
+        # Each frame lasts until the next kept one, the last one to the end.
         begins = np.append(np.concatenate([[0], ends])[kept], ends[-1])
-        plain[kept[0]].save(
-            path, save_all=True, append_images=[plain[i] for i in kept[1:]], loop=0,
+        images[kept[0]].save(
+            path, save_all=True, append_images=[images[i] for i in kept[1:]], loop=0,
             duration=(10 * np.diff(begins)).tolist(), optimize=False, disposal=1,
         )  # fmt: skip
         share = _MOST_BYTES / path.stat().st_size
         if share >= 1 or len(kept) <= _FEWEST_FRAMES:
             return
         fewer = max(_FEWEST_FRAMES, int(0.95 * share * len(kept)))
-        kept = np.linspace(0, len(plain) - 1, fewer).round().astype(int)
+        kept = np.linspace(0, len(images) - 1, fewer).round().astype(int)
 
 
 def _palette() -> Pixels:
-    """Return white, and each colour in use from whole to faint, shape (n, 3).
+    """Return white, and each colour in use from full to faint, shape (n, 3).
 
-    A palette made from the frames would leave out what is small, like the start and the goal.
+    A palette made from the frames would lack the colours of small dots such as start and goal.
     """
     from matplotlib import colormaps  # noqa: PLC0415
 
     trees = [colour for number in (0, 1, 2) for colour in style.tree_style(number)[1:]]
-    others = [style.START, style.GOAL, style.RAW, style.SMOOTHED, style.REJECTED, style.QUIET,
+    others = [style.START, style.GOAL, style.PATH, style.SMOOTHED, style.REJECTED, style.QUIET,
               style.ROBOT, rgb(OBSTACLE_3D), rgb(OBSTACLE)]  # fmt: skip
     full = np.array([*trees, *others])[:, None]
     faint = 1 - (1 - full) * np.array([1.0, 0.75, 0.5, 0.25])[:, None]
     heat = colormaps[style.HEAT](np.linspace(0, 1, 48))[:, :3]
-    in_space = 1 - (1 - heat) * style.CELL_ALPHA
-    colours = np.concatenate([[[1, 1, 1]], faint.reshape(-1, 3), heat, in_space])
+    heat_3d = 1 - (1 - heat) * style.CELL_ALPHA
+    colours = np.concatenate([[[1, 1, 1]], faint.reshape(-1, 3), heat, heat_3d])
     return np.unique((255 * colours).round().astype(np.uint8), axis=0)
 
 
-def _write_mp4(frames: Iterator[Pixels], seconds: list[float], path: Path) -> None:
+def _write_mp4(frames: Iterator[Pixels], durations: list[float], path: Path) -> None:
     """Pipe frames into ffmpeg."""
     first = next(frames)
     size = f"{first.shape[1]}x{first.shape[0]}"
     command = [
         need_ffmpeg(), "-y", "-loglevel", "error", "-nostdin", "-f", "rawvideo",
-        "-pix_fmt", "rgb24", "-s", size, "-r", f"{1 / seconds[0]:.6f}", "-i", "-", "-an",
+        "-pix_fmt", "rgb24", "-s", size, "-r", f"{1 / durations[0]:.6f}", "-i", "-", "-an",
         "-vf", f"tpad=stop_mode=clone:stop_duration={_HOLD_S}", "-c:v", "libx264", "-crf", "20",
         "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-map_metadata", "-1",
         "-fflags", "+bitexact", "-flags:v", "+bitexact", "-threads", "1", str(path),
     ]  # fmt: skip
-    with tempfile.TemporaryFile() as complaints:
+    with tempfile.TemporaryFile() as errors:
         process = subprocess.Popen(  # noqa: S603 - found on the user's own PATH
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=complaints
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors
         )
         assert process.stdin is not None  # noqa: S101 - it is a pipe
         try:
-            # If it ends before it has read everything, its exit code and its words say why.
+            # If ffmpeg ends before it has read everything, its exit code and output say why.
             with suppress(BrokenPipeError), process.stdin:
                 process.stdin.write(first.tobytes())
                 for frame in frames:
@@ -244,7 +235,7 @@ def _write_mp4(frames: Iterator[Pixels], seconds: list[float], path: Path) -> No
         finally:
             code = process.wait()
         if code != 0:
-            complaints.seek(0)
-            said = complaints.read().decode(errors="replace").strip().splitlines()
-            why = said[-1] if said else f"exit code {code}"
+            errors.seek(0)
+            lines = errors.read().decode(errors="replace").strip().splitlines()
+            why = lines[-1] if lines else f"exit code {code}"
             raise BrrtError(f"ffmpeg cannot write {path.suffix}: {why}; write a .gif instead")

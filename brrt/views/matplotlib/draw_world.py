@@ -1,4 +1,4 @@
-"""Worlds drawn by matplotlib, fit for a paper. It is an extra: pip install 'brrt[plot]'."""
+"""Worlds drawn by matplotlib, which is an extra: pip install 'brrt[plot]'."""
 
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.files import replacing
-from brrt.views.colours import GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, Colour
+from brrt.views.colours import GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, rgb
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
@@ -16,23 +16,23 @@ Floats = NDArray[np.float64]
 
 _INCHES, _DPI = 6.0, 200
 _LIGHT = np.array([-0.35, -0.55, 0.75])
-_SEE_THROUGH = 0.45
+_ALPHA_3D = 0.45
 _SEAM = 0.25
-"""Line width, in points, that closes the hairlines between obstacles that touch."""
+"""Line width, in points, that closes hairlines between obstacles that touch."""
 _AROUND, _UP = 24, 12
-"""Faces of a sphere."""
+"""Faces of a sphere, around and from pole to pole."""
 _MOST_FACES = 40_000
 
 
-def save_picture(world: World, path: Path) -> None:
-    """Draw a world into a .png, .svg or .pdf file; it appears under its name when it is whole.
+def save_world(world: World, path: Path) -> None:
+    """Draw a world into a .png, .svg or .pdf file, which appears once it is complete.
 
     Raises:
         BrrtError: matplotlib is missing, or the file cannot be written.
     """
     matplotlib = need_matplotlib()
     width, height = (world.upper - world.lower)[:2] if world.dim == 2 else (1.0, 1.0)
-    # Very long worlds get a picture that is long, not one that is a line.
+    # The picture of a very long world is at least a fifth as high as it is wide.
     size = np.maximum(np.array([width, height]) / max(width, height), 0.2) * _INCHES
     figure = matplotlib.figure.Figure(figsize=tuple(size), dpi=_DPI)
     plot_world(world, figure.add_subplot(projection=None if world.dim == 2 else "3d"))
@@ -40,12 +40,12 @@ def save_picture(world: World, path: Path) -> None:
 
 
 def save_figure(figure: Any, path: Path, **how: Any) -> None:
-    """Write a figure without the time, so that the same figure gives the same file.
+    """Write a figure without a date, so that equal figures give equal files.
 
     Args:
-        figure: Of matplotlib.
-        path: The file; it appears under its name when it is whole.
-        how: What `savefig` is to know besides.
+        figure: The matplotlib figure.
+        path: The file; it appears once it is complete.
+        how: Other arguments of `savefig`.
 
     Raises:
         BrrtError: The file cannot be written.
@@ -68,7 +68,7 @@ def plot_world(world: World, ax: Any = None) -> Any:
         The axes.
 
     Raises:
-        BrrtError: matplotlib is missing, or the axes are of no use for this world.
+        BrrtError: matplotlib is missing, or the projection of the axes is not the world's.
     """
     need_matplotlib()
     if ax is None:
@@ -87,7 +87,7 @@ def plot_world(world: World, ax: Any = None) -> Any:
 
 
 def new_axes(projection: str | None = None) -> Any:
-    """Return axes of a new figure, which a notebook shows."""
+    """Return axes of a new figure that notebooks show."""
     import matplotlib.pyplot as plt  # noqa: PLC0415 - it opens windows
 
     return plt.subplots(subplot_kw={"projection": projection})[1]
@@ -106,11 +106,6 @@ def need_matplotlib() -> Any:
             "pictures need matplotlib, which is not installed; pip install 'brrt[plot]'"
         ) from None
     return matplotlib
-
-
-def rgb(colour: Colour) -> tuple[float, ...]:
-    """Return a colour as matplotlib takes it."""
-    return tuple(value / 255 for value in colour)
 
 
 def _draw_2d(world: World, ax: Any) -> None:
@@ -138,19 +133,24 @@ def _draw_2d(world: World, ax: Any) -> None:
         ax.add_collection(
             marks.LineCollection(segments, color=dark, linewidths=1.2, capstyle="round")
         )
-    for point, colour, name in ((world.start, START, "start"), (world.goal, GOAL, "goal")):
-        if point is not None:
-            ax.plot(
-                *point, "o", ms=7, color=rgb(colour), mec="white", mew=0.8, zorder=5, label=name
-            )
+    _draw_ends(world, ax)
     ax.set(xlim=(x0, x1), ylim=(y1, y0) if world.y_down else (y0, y1), aspect="equal")
     ax.tick_params(color=rgb(OUTLINE), labelcolor=rgb(OUTLINE), labelsize=7, width=0.5, length=2.5)
     for spine in ax.spines.values():
         spine.set(color=rgb(OUTLINE), linewidth=0.6)
 
 
+def _draw_ends(world: World, ax: Any) -> None:
+    for point, colour, name in ((world.start, START, "start"), (world.goal, GOAL, "goal")):
+        if point is not None:
+            ax.plot(
+                *point[:, None], ls="", marker="o", ms=7, color=rgb(colour), mec="white", mew=0.8,
+                zorder=5, label=name,
+            )  # fmt: skip
+
+
 def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
-    """Draw the cells as an image, nearest, on ground that is blocked where the grid ends."""
+    """Draw the cells as an image; space that the grid does not cover is blocked."""
     from matplotlib.colors import ListedColormap  # noqa: PLC0415
     from matplotlib.patches import Rectangle  # noqa: PLC0415
     from matplotlib.transforms import Affine2D  # noqa: PLC0415
@@ -178,7 +178,7 @@ def _draw_3d(world: World, ax: Any) -> None:
         lengths = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
         light = normals @ (_LIGHT / np.linalg.norm(_LIGHT)) / lengths
         shade = (0.62 + 0.38 * light)[:, None] * rgb(OBSTACLE_3D)
-        colours = np.concatenate([shade, np.full((len(shade), 1), _SEE_THROUGH)], axis=1)
+        colours = np.concatenate([shade, np.full((len(shade), 1), _ALPHA_3D)], axis=1)
         edges = np.where(np.arange(len(faces)) < 6 * len(world.boxes), 0.25, 0.0)
         ax.add_collection3d(
             Poly3DCollection(
@@ -186,10 +186,7 @@ def _draw_3d(world: World, ax: Any) -> None:
             )
         )
     ax.computed_zorder = False
-    for point, colour, name in ((world.start, START, "start"), (world.goal, GOAL, "goal")):
-        if point is not None:
-            mark = {"marker": "o", "ms": 7, "mec": "white", "mew": 0.8}
-            ax.plot(*point[:, None], color=rgb(colour), zorder=5, label=name, ls="", **mark)
+    _draw_ends(world, ax)
     limits = zip("xyz", world.lower, world.upper, strict=True)
     ax.set(**{f"{axis}lim": (low, high) for axis, low, high in limits})
     ax.set_box_aspect(world.upper - world.lower)
@@ -199,11 +196,11 @@ def _draw_3d(world: World, ax: Any) -> None:
         axis.set_major_locator(MaxNLocator(max(1, round(5 * size))))
         axis.set_pane_color((1, 1, 1, 0))
         axis.line.set(color=rgb(OUTLINE), linewidth=0.6)
-        axis._axinfo["grid"].update(linewidth=0.25, color="0.85")  # noqa: SLF001 - no public way
+        axis._axinfo["grid"].update(linewidth=0.25, color="0.85")  # noqa: SLF001 - no public API
 
 
 def _box_faces(boxes: Floats) -> Floats:
-    """Return the faces of boxes, outwards counter-clockwise, shape (6 n, 4, 3)."""
+    """Return the faces of boxes, counter-clockwise from outside, shape (6 n, 4, 3)."""
     low, high = boxes[:, None, :3], boxes[:, None, 3:]
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     unit = np.zeros((6, 4, 3))
@@ -216,7 +213,7 @@ def _box_faces(boxes: Floats) -> Floats:
 
 
 def _ball_faces(balls: Floats) -> Floats:
-    """Return four-cornered faces of spheres, fewer where there are many; shape (m, 4, 3)."""
+    """Return quadrilateral faces of spheres, fewer of each if there are many; shape (m, 4, 3)."""
     around = _AROUND if len(balls) * _AROUND * _UP < _MOST_FACES else 8
     up = around // 2
     a, b = np.meshgrid(

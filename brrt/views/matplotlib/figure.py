@@ -9,33 +9,33 @@ from typing import Any
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
-from brrt.events import Kind
+from brrt.events import Kind, Stage
 from brrt.recording import Recording, check_limits
 from brrt.views.matplotlib import style
 from brrt.views.matplotlib.curves import Against, draw_cost, draw_time
 from brrt.views.matplotlib.draw_world import need_matplotlib, new_axes, plot_world, save_figure
-from brrt.views.matplotlib.history import Record
-from brrt.views.matplotlib.tree import TreePanel
+from brrt.views.matplotlib.tree_panel import TreePanel
 from brrt.worlds.world import World
 
 PANELS = ("tree", "cost", "time")
 _CURVE_HEIGHT, _SCALE_HEIGHT, _LEGEND_HEIGHT = 2.4, 0.65, 0.35
+"""In inches, as all heights and widths here."""
 _LEGEND_COLUMNS, _LEGEND_LINE = 4, 0.8
 _LOWEST, _HIGHEST = 0.3, 2.2
-"""Shapes that a map may have, height by width, before it is drawn with empty margins."""
+"""Least and greatest height of a map in widths; maps beyond have empty margins."""
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class FigureOptions:
     """How a figure is drawn.
 
     Attributes:
-        width: Its width in inches; by default a column's for one panel and a page's for more.
-        dpi: Dots per inch, also of what is an image in a .svg or .pdf.
+        width: Width in inches; by default a column's for one panel and a page's for more.
+        dpi: Dots per inch, also of images in a .svg or .pdf.
         rejects: How many of the newest rejected extensions are drawn.
         against: Abscissa of costs; see `draw_cost`.
-        azimuth: Where the camera of a 3D world stands, in degrees around the vertical.
-        elevation: How high it stands, in degrees.
+        azimuth: Camera of a 3D world, in degrees around the vertical.
+        elevation: Camera of a 3D world, in degrees above the horizon.
     """
 
     width: float | None = None
@@ -47,43 +47,53 @@ class Look:
 
 
 def save_plot(
-    records: Sequence[Record], path: Path, panels: Sequence[str] = (), look: Look | None = None
+    recordings: Sequence[Recording],
+    path: Path,
+    panels: Sequence[str] = (),
+    options: FigureOptions | None = None,
+    names: Sequence[str] = (),
 ) -> None:
     """Draw runs into a .png, .svg or .pdf file; equal runs give equal files.
 
     Args:
-        records: The runs; several are for costs alone.
-        path: The file; it appears under its name when it is whole.
-        panels: Some of `PANELS`; by default the tree, with the cost where the planner improves,
-            and of several runs the cost.
-        look: How.
+        recordings: The runs; several share the panel of costs only.
+        path: The file; it appears once it is complete.
+        panels: Some of `PANELS`; by default the tree, with the cost where the planner improves its
+            path, and of several runs the cost.
+        options: How it is drawn.
+        names: Names of the runs in legends and messages; by default those of the recordings.
 
     Raises:
         BrrtError: matplotlib is missing, a panel has nothing to show, or the file cannot be
             written.
     """
-    mpl, look = need_matplotlib(), look or Look()
+    mpl, options = need_matplotlib(), options or FigureOptions()
+    runs = [recording.until() for recording in recordings]
+    names = names or [run.name for run in runs]
     if not panels:
-        single = ("tree", "cost") if records[0].improves else ("tree",)
-        panels = single if len(records) == 1 else ("cost",)
-    if len(records) > 1 and set(panels) != {"cost"}:
-        raise BrrtError("several runs share a picture of their costs alone; give --what cost")
+        improved = (runs[0].events()[Kind.PATH]["stage"] == Stage.IMPROVED).any()
+        panels = ("cost",) if len(runs) > 1 else ("tree", "cost") if improved else ("tree",)
+    if len(runs) > 1 and set(panels) != {"cost"}:
+        raise BrrtError("several runs share a figure of their costs only; give --what cost")
     with style.paper():
-        width = look.width or (style.COLUMN_IN if len(panels) == 1 else style.PAGE_IN)
-        shares = _shares(panels)
-        heights = [_height(records[0], p, width * s) for p, s in zip(panels, shares, strict=True)]
+        width = options.width or (style.COLUMN_IN if len(panels) == 1 else style.PAGE_IN)
+        weights = np.array([1.15 if panel == "tree" else 1.0 for panel in panels])
+        shares = weights / weights.sum()
+        heights = [_height(runs[0], p, width * s) for p, s in zip(panels, shares, strict=True)]
         figure = mpl.figure.Figure(
-            figsize=(width, max(heights)), dpi=look.dpi, layout="constrained"
+            figsize=(width, max(heights)), dpi=options.dpi, layout="constrained"
         )
         parts = np.atleast_1d(figure.subfigures(1, len(panels), width_ratios=shares))
         for panel, part in zip(panels, parts, strict=True):
             if panel == "tree":
-                _add_tree(part, records[0], look)
+                tree = tree_panel(part, runs[0], options)
+                tree.show(tree.playback.last)
+                add_legend(part, tree, tree.legend())
             elif panel == "cost":
-                draw_cost(part.add_subplot(), records, look.against)
+                draw_cost(part.add_subplot(), runs, names, options.against)
             else:
-                draw_time(part.subplots(3, 1, sharex=True), records[0])
-        save_figure(figure, path, dpi=look.dpi)
+                draw_time(part.subplots(3, 1, sharex=True), runs[0], names[0])
+        save_figure(figure, path, dpi=options.dpi)
 
 
 def plot(
@@ -98,7 +108,7 @@ def plot(
 
     Args:
         run: The run, or a world.
-        ax: Axes of matplotlib, with projection "3d" for the tree in a world in 3D.
+        ax: Axes of matplotlib, with projection "3d" for a tree or a world in 3D.
         what: "tree", or "cost" for the cost of the best path.
         rejects: How many of the newest rejected extensions are drawn.
         until: The instant, as `Events.until` takes it; the end by default.
@@ -110,57 +120,50 @@ def plot(
         return plot_world(run, ax)
     need_matplotlib()
     check_limits(until, "ax", "what", "rejects")
-    events = run.events().until(**until)
-    record = Record(run.manifest.scenario.planner, run.manifest, run.world, events)
     if what not in PANELS[:2]:
         raise unknown("panel", what, PANELS[:2])
+    run = run.until(**until)
     with style.paper() if ax is None else nullcontext():
-        deep = what == "tree" and record.manifest.dim == 3
+        deep = what == "tree" and run.manifest.dim == 3
         ax = new_axes("3d" if deep else None) if ax is None else ax
         if what == "cost":
-            return draw_cost(ax, [record])
-        panel = TreePanel(record, ax, rejects)
-        panel.show(panel.history.last)
+            return draw_cost(ax, [run], [run.manifest.scenario.planner])
+        panel = TreePanel(run, ax, rejects)
+        panel.show(panel.playback.last)
     return ax
 
 
-def tree_panel(part: Any, record: Record, look: Look) -> TreePanel:
-    """Put axes into a figure, or a part of one, and the run at no instant yet into these."""
-    flat = record.manifest.dim == 2
+def tree_panel(part: Any, recording: Recording, options: FigureOptions) -> TreePanel:
+    """Add axes for a run to a figure, or a part of one; `TreePanel.show` draws an instant."""
+    flat = recording.manifest.dim == 2
     ax = part.add_subplot(projection=None if flat else "3d")
     if not flat:
-        ax.view_init(elev=look.elevation, azim=look.azimuth)
-    return TreePanel(record, ax, look.rejects)
+        ax.view_init(elev=options.elevation, azim=options.azimuth)
+    return TreePanel(recording, ax, options.rejects)
 
 
-def height_of_tree(record: Record, width: float) -> float:
-    """Return the height, in inches, that suits the world, its legend and scale in a width."""
-    below = _LEGEND_HEIGHT + _SCALE_HEIGHT * bool(record.events.counts.get(Kind.EXPAND))
-    if record.manifest.dim == 3:
+def height_of_tree(recording: Recording, width: float) -> float:
+    """Return the height for a world, its legend and its colour scale in a width."""
+    below = _LEGEND_HEIGHT + _SCALE_HEIGHT * (len(recording.events()[Kind.EXPAND]) > 0)
+    if recording.manifest.dim == 3:
         return 0.85 * width + below
-    size = record.world.upper - record.world.lower
+    size = recording.world.upper - recording.world.lower
     map_height = (width - 0.35) * float(np.clip(size[1] / size[0], _LOWEST, _HIGHEST))
     return map_height + 0.4 + below
 
 
-def _add_tree(part: Any, record: Record, look: Look) -> None:
-    panel = tree_panel(part, record, look)
-    panel.show(panel.history.last)
-    explain(part, panel, panel.legend())
-
-
-def explain(part: Any, panel: TreePanel, marks: Sequence[Any]) -> None:
-    """Say below a tree what is what.
+def add_legend(part: Any, panel: TreePanel, artists: Sequence[Any]) -> None:
+    """Add a legend, and a colour scale for cells, below a tree.
 
     Args:
-        part: The figure.
+        part: The figure, or the part of one.
         panel: The tree in it.
-        marks: What has a name, see `TreePanel.legend`.
+        artists: What the legend names; see `TreePanel.legend`.
     """
-    rows = -(-len(marks) // _LEGEND_COLUMNS)
-    columns = -(-len(marks) // rows)
+    rows = -(-len(artists) // _LEGEND_COLUMNS)
+    columns = -(-len(artists) // rows)
     legend = part.legend(
-        handles=marks, loc="outside lower center", ncols=columns, borderaxespad=0.2
+        handles=artists, loc="outside lower center", ncols=columns, borderaxespad=0.2
     )
     for line in legend.get_lines():
         if line.get_linewidth() > 0:
@@ -171,12 +174,7 @@ def explain(part: Any, panel: TreePanel, marks: Sequence[Any]) -> None:
         part.colorbar(cells, ax=part.axes[0], label=meaning, **below)
 
 
-def _shares(panels: Sequence[str]) -> list[float]:
-    weights = [1.15 if panel == "tree" else 1.0 for panel in panels]
-    return [weight / sum(weights) for weight in weights]
-
-
-def _height(record: Record, panel: str, width: float) -> float:
+def _height(recording: Recording, panel: str, width: float) -> float:
     if panel == "tree":
-        return height_of_tree(record, width)
+        return height_of_tree(recording, width)
     return _CURVE_HEIGHT * (1.35 if panel == "time" else 1.0)

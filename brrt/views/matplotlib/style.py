@@ -1,43 +1,27 @@
-"""How runs look on white paper: colours, sizes of type, and figures of a column's width."""
+"""How figures look on white paper: colours, sizes of type, and widths of a column and a page."""
 
-from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
 
-from brrt.views.colours import Colour
-from brrt.views.matplotlib.draw_world import need_matplotlib, rgb
+from brrt.views import colours
+from brrt.views.colours import rgb
+from brrt.views.matplotlib.draw_world import need_matplotlib
 
-# The viewer's hues, darker: there, bright colours stand on a dark ground.
-START = rgb((228, 108, 10))
-GOAL = rgb((24, 150, 62))
-RAW = rgb((216, 164, 0))
-SMOOTHED = rgb((168, 110, 0))
-REJECTED = rgb((178, 120, 124))
-ROBOT = rgb((20, 22, 28))
-QUIET = rgb((96, 103, 118))
-"""Type and ticks that explain."""
+START, GOAL = rgb(colours.PAPER_START), rgb(colours.PAPER_GOAL)
+PATH, SMOOTHED = rgb(colours.PAPER_PATH), rgb(colours.PAPER_SMOOTHED)
+REJECTED, ROBOT = rgb(colours.PAPER_REJECTED), rgb(colours.PAPER_ROBOT)
+QUIET = rgb(colours.OUTLINE)
+"""Captions and notes."""
+CURVES = tuple(map(rgb, colours.PAPER_CURVES))
 HEAT = "viridis"
-"""Map of colours from cheap to dear, even to the colour-blind eye and in grey."""
+"""Colour map from low to high, even to colour-blind eyes and in grey."""
 CELL_ALPHA = 0.75
-"""Of cells in 3D, where one looks through them."""
-
-_TREES: Mapping[int, tuple[str, Colour, Colour]] = {
-    0: ("start", (38, 104, 214), (0, 158, 190)),
-    1: ("goal", (206, 38, 46), (222, 92, 150)),
-}
-_OTHER: Colour = (124, 74, 190)
-CURVES = tuple(
-    rgb(colour)
-    for colour in (
-        (38, 104, 214), (206, 38, 46), (24, 150, 62), (228, 108, 10), (124, 74, 190),
-        (0, 140, 168), (150, 90, 60), (96, 103, 118),
-    )
-)  # fmt: skip
+"""Of cells in 3D, which one sees through."""
 
 COLUMN_IN, PAGE_IN = 3.3, 6.9
-"""Widths, in inches, of one column and of both on the pages of most journals."""
+"""Widths, in inches, of a column and of a page of two columns in most journals."""
 
 _TYPE = {
     "font.size": 7.5,
@@ -60,18 +44,19 @@ _TYPE = {
     "axes.formatter.limits": (-4, 6),
     "figure.facecolor": "white",
     "axes.facecolor": "white",
-    "pdf.fonttype": 42,  # type that can be searched, as publishers want it
+    "pdf.fonttype": 42,  # searchable type, which publishers require
 }
 
 
 def tree_style(number: int) -> tuple[str, tuple[float, ...], tuple[float, ...]]:
     """Return a tree's name, its colour, and that of its rewired edges."""
-    name, colour, rewired = _TREES.get(number, (str(number), _OTHER, _OTHER))
+    other = (str(number), colours.PAPER_OTHER, colours.PAPER_OTHER)
+    name, colour, rewired = colours.PAPER_TREES.get(number, other)
     return name, rgb(colour), rgb(rewired)
 
 
 def paper() -> AbstractContextManager[Any]:
-    """Set sizes of type and lines while the body draws, whatever the user's own settings are."""
+    """Set sizes of type and lines in the body, independent of the user's settings."""
     mpl = need_matplotlib()
     defaults = {
         key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")
@@ -81,7 +66,7 @@ def paper() -> AbstractContextManager[Any]:
 
 
 def clean(ax: Any) -> None:
-    """Take away what a curve does not need: the frame above and at the right."""
+    """Remove the frame above and at the right of axes, and draw a grid."""
     ax.spines[["top", "right"]].set_visible(False)
     ax.grid(visible=True, linewidth=0.3, color="0.88")
     ax.set_axisbelow(True)

@@ -1,4 +1,4 @@
-"""Events as Arrow columns, the way Rerun takes them; `rrd_reader` undoes that."""
+"""Events as Arrow columns for Rerun; `brrt.formats.rrd` reads them back."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -14,24 +14,24 @@ pa: Any = pyarrow  # mypy knows none of its names
 
 
 class Column(NamedTuple):
-    """A column of times or of components, as `send_columns` takes either.
+    """A column of times or components, as `send_columns` takes either.
 
-    Rerun's own classes look at all that they are given: that takes longer than to send it.
+    It replaces Rerun's own classes, whose checks take longer than sending the data.
 
     Attributes:
         name: The timeline, or the component's descriptor.
-        values: An Arrow array with one value a row, of components one list.
+        values: An Arrow array: one value a row for times, one list a row for components.
     """
 
     name: Any
     values: Any
 
     def timeline_name(self) -> str:
-        """Return the timeline."""
+        """Return the name of the timeline."""
         return str(self.name)
 
     def component_descriptor(self) -> Any:
-        """Return which component it is."""
+        """Return the descriptor of the component."""
         return self.name
 
     def as_arrow_array(self) -> Any:
@@ -50,11 +50,11 @@ def time_columns(rows: Table) -> list[Column]:
 
 
 def event_columns(archetype: str, fields: Iterable[Field], table: Table) -> list[Column]:
-    """Return the fields of events, one component each."""
+    """Return the fields of events as columns, one component each."""
     offsets, columns = pa.array(np.arange(len(table) + 1, dtype=np.int32)), []
     for field in fields:
         values = to_arrow(field, table[field.name])
-        if field.type != "q[]":  # whose values are lists, one a row, as they come
+        if field.type != "q[]":  # that array holds a list a row already
             values = pa.ListArray.from_arrays(offsets, values)
         name = rr.ComponentDescriptor(f"{archetype}:{field.name}", archetype=archetype)
         columns.append(Column(name, values))
@@ -67,17 +67,17 @@ def to_arrow(field: Field, values: NDArray[Any]) -> Any:
         flat = [np.ravel(row) for row in values]
         offsets = np.cumsum([0, *map(len, flat)], dtype=np.int32)
         return pa.ListArray.from_arrays(offsets, pa.array(np.concatenate(flat), pa.float64()))
-    values = np.ascontiguousarray(values)  # pyarrow copies what has gaps value by value
+    values = np.ascontiguousarray(values)  # pyarrow copies arrays with gaps value by value
     if field.type == "q":
         return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
     return pa.array(values)
 
 
 def line_strips(places: NDArray[np.float32], lengths: int | Sequence[int]) -> Any:
-    """Return line strips as Arrow holds them; Rerun's own conversion takes ten times longer.
+    """Return line strips as an Arrow array; Rerun's own conversion takes ten times longer.
 
     Args:
-        places: Their points, one after the other, shape (n, 2) or (n, 3).
+        places: Their points, one after another, shape (n, 2) or (n, 3).
         lengths: Points of each strip; one number if all are equal.
     """
     if isinstance(lengths, int):
@@ -86,6 +86,6 @@ def line_strips(places: NDArray[np.float32], lengths: int | Sequence[int]) -> An
         offsets = np.cumsum([0, *lengths], dtype=np.int32)
     flat = places.shape[1] == 2
     batch: Any = rr.components.LineStrip2DBatch if flat else rr.components.LineStrip3DBatch
-    arrow = batch._ARROW_DATATYPE  # noqa: SLF001 - only this very type is taken as it is
+    arrow = batch._ARROW_DATATYPE  # noqa: SLF001 - only this exact type is not converted
     points = pa.FixedSizeListArray.from_arrays(places.reshape(-1), type=arrow.value_type)
     return pa.ListArray.from_arrays(offsets, points, type=arrow)

@@ -1,7 +1,9 @@
-"""A world in Rerun: its obstacles and bounds, marks for start and goal, and a view of it."""
+"""A world in Rerun: obstacles, bounds, markers with labels, and the view of it."""
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,26 +11,72 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from brrt.views.colours import FREE, OBSTACLE, OBSTACLE_3D, OUTLINE, Colour
+from brrt.errors import RecordingError
+from brrt.robots import Robot
+from brrt.views.colours import FREE, GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, Colour
+from brrt.views.rerun.stream import rrd_file, viewer_stream
 from brrt.worlds.free_space import occupied
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
+_GREATEST = 1e30
+"""Greatest coordinate: a viewer multiplies lengths by others in single precision."""
 _CORNERS = 1 / 16, 1 / 4
-"""Thinner lines along the edge of a box in 2D, in radii of the others, whose corners are round."""
+"""Radii of two thin lines along the edge of a box in 2D, in radii of the others, whose round
+corners leave the box's own unfilled."""
 _LAYERS, _OVERLAP = 5, 1.5
-"""Lines that fill half of a box in 2D, and their distance in radii: less than 2, so that each
-covers the missing corner of the next."""
+"""Nested lines that fill half of a box in 2D, and their distance in radii: less than 2, so that
+each covers the round corners of the next."""
 _PIXELS = 640
-"""Along the longer side of the image that fills polygons: as fine as a window shows a map."""
+"""Pixels along the longer side of the image that fills polygons: about a window's resolution."""
+
+
+def show_world(world: World, *, path: Path | None = None, view: bool = False) -> None:
+    """Write a world to an .rrd file, or show it in Rerun's viewer, or both.
+
+    Args:
+        world: The world.
+        path: The file; it is overwritten.
+        view: Show it in the open viewer, or in one that is opened for it.
+
+    Raises:
+        BrrtError: The file cannot be written, there is no viewer, or a coordinate is too large for
+            single precision.
+    """
+    if max(np.abs(world.lower).max(), np.abs(world.upper).max()) > _GREATEST:
+        raise RecordingError(
+            f"{world.name}: Rerun draws in single precision, with coordinates up to {_GREATEST:g}; "
+            f"make the world smaller"
+        )
+    name = f"world-{hashlib.sha256(world.to_json().encode()).hexdigest()[:16]}"
+    layout = rrb.Blueprint(
+        world_view(world),
+        rrb.TimePanel(state="hidden"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
+    names = name, application(world, f"{world.dim}d world")
+    if path is not None:
+        with rrd_file(path, *names, layout) as rec:
+            _log_query(rec, world)
+    if view:
+        with viewer_stream(*names, layout) as rec:
+            _log_query(rec, world)
+
+
+def _log_query(rec: rr.RecordingStream, world: World) -> None:
+    log_world(rec, world)
+    for name, point, colour in (("start", world.start, START), ("goal", world.goal, GOAL)):
+        if point is not None:
+            log_marker(rec, world, name, point[None].astype(np.float32), colour)
 
 
 def application(world: World, what: str) -> str:
-    """Name what shares a layout: a viewer keeps one for each application, and shows the last.
+    """Return the name under which a viewer keeps a layout; it shows the last one of each name.
 
     Args:
-        world: What is seen of it is part of the layout.
-        what: Is drawn in it.
+        world: Its bounds are part of the layout.
+        what: What is drawn in it.
     """
     size = " x ".join(f"{side:g}" for side in world.upper - world.lower)
     corner = ", ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
@@ -36,21 +84,31 @@ def application(world: World, what: str) -> str:
     return " ".join(["brrt", what, size, *ways])
 
 
+def places(values: Any, robot: Robot) -> NDArray[np.float32]:
+    """Return where configurations, shape (n, dof), are drawn, shape (n, dim)."""
+    return np.ascontiguousarray(robot.places(np.asarray(values, np.float64)), np.float32)
+
+
 def log_world(rec: rr.RecordingStream, world: World) -> None:
     """Draw obstacles and bounds."""
     if world.dim == 2 and not world.y_down:
         # Rerun's 2D views have y pointing down; most maps have it pointing up.
         rec.log("/world", rr.Transform3D(scale=[1, -1, 1]), static=True)
-    still = _still_2d(world) if world.dim == 2 else _still_3d(world)
-    for entity, archetype in still.items():
+    archetypes = _archetypes_2d(world) if world.dim == 2 else _archetypes_3d(world)
+    for entity, archetype in archetypes.items():
         rec.log(entity, archetype, static=True)
 
 
-def log_mark(
+def log_marker(
     rec: rr.RecordingStream, world: World, name: str, place: NDArray[np.float32], colour: Colour
 ) -> None:
-    """Mark a place, shape (1, d), and write a name below."""
-    rec.log(f"/world/{name}", _mark(place, colour, world.extent), static=True)
+    """Draw a dot at a place, shape (1, dim), with a name below."""
+    if world.dim == 2:
+        disc = _discs(place, 1e-6 * world.extent)
+        dot: Any = rr.LineStrips2D(disc, colors=colour, radii=-7, draw_order=100)
+    else:
+        dot = rr.Points3D(place, colors=colour, radii=-7)
+    rec.log(f"/world/{name}", dot, static=True)
     log_label(rec, world, name, place, colour, name)
 
 
@@ -63,11 +121,13 @@ def log_label(
     text: str,
     far: float = 0.012,
 ) -> None:
-    """Write a text below a place, shape (1, d), so far as a part of the world's extent."""
-    # Rerun writes a label across its point; this one stands below.
+    """Write a text below a place, shape (1, dim), `far` below as a part of the world's extent."""
+    # Rerun centres a label on its point.
     down = np.eye(world.dim, dtype=np.float32)[-1] * (1 if world.y_down else -1)
     below = place + np.float32(far * world.extent) * down
-    rec.log(f"/world/{name}/label", _label(below, colour, text), static=True)
+    points: Any = rr.Points2D if world.dim == 2 else rr.Points3D
+    label = points(below, colors=colour, radii=0, labels=text, show_labels=True)
+    rec.log(f"/world/{name}/label", label, static=True)
 
 
 def world_view(
@@ -77,13 +137,13 @@ def world_view(
     below: str = "",
     name: str = "World",
 ) -> Any:
-    """Lay out a view of the world and of what happens in it; the whole of it is in sight.
+    """Return a view of the whole world and what is drawn in it.
 
     Args:
         world: The world.
-        overrides: What the view changes of its entities.
-        below: The entity below which the world was drawn.
-        name: The view's.
+        overrides: Components that the view sets, by entity.
+        below: The entity below which the world is drawn.
+        name: The view's title.
     """
     options: dict[str, Any] = {
         "origin": "/",
@@ -109,22 +169,9 @@ def world_view(
     return rrb.Spatial3DView(eye_controls=eye, line_grid=False, **options)
 
 
-def _mark(place: NDArray[np.float32], colour: Colour, extent: float) -> Any:
-    if place.shape[1] == 2:
-        return rr.LineStrips2D(
-            _discs(place, 1e-6 * extent), colors=colour, radii=-7, draw_order=100
-        )
-    return rr.Points3D(place, colors=colour, radii=-7)
-
-
-def _label(place: NDArray[np.float32], colour: Colour, text: str) -> Any:
-    points: Any = rr.Points2D if place.shape[1] == 2 else rr.Points3D
-    return points(place, colors=colour, radii=0, labels=text, show_labels=True)
-
-
-def _still_2d(world: World) -> dict[str, Any]:
+def _archetypes_2d(world: World) -> dict[str, Any]:
     size = world.upper - world.lower
-    still: dict[str, Any] = {
+    found: dict[str, Any] = {
         "/world/bounds": rr.Boxes2D(
             mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-1, draw_order=-1
         ),
@@ -135,21 +182,21 @@ def _still_2d(world: World) -> dict[str, Any]:
     if len(world.balls):
         radii = world.balls[:, 2]
         discs = _discs(world.balls[:, :2], 1e-3 * radii[:, None])
-        still["/world/obstacles/balls"] = rr.LineStrips2D(
+        found["/world/obstacles/balls"] = rr.LineStrips2D(
             discs, radii=radii, colors=OBSTACLE, draw_order=0
         )
     if len(world.boxes):
-        still["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
+        found["/world/obstacles/boxes"] = _filled_boxes(world.boxes[:, :2], world.boxes[:, 2:])
     outside = () if world.grid is None else tuple(world.grid.outside(world.lower, world.upper))
     if world.polygons or outside:
-        still |= _filled_polygons(replace(world, polygons=world.polygons + outside, grid=None))
+        found |= _filled_polygons(replace(world, polygons=world.polygons + outside, grid=None))
     if world.grid is not None:
-        still |= _still_cells(world.grid)
-    return still
+        found |= _filled_cells(world.grid)
+    return found
 
 
-def _still_cells(grid: Grid) -> Iterator[tuple[str, Any]]:
-    """Draw the cells as an image in a frame of its own."""
+def _filled_cells(grid: Grid) -> Iterator[tuple[str, Any]]:
+    """Yield the blocked cells as an image in a frame of its own."""
     turn = rr.RotationAxisAngle([0, 0, 1], radians=grid.yaw)
     frame = rr.Transform3D(translation=[*grid.origin, 0], rotation=turn, scale=grid.resolution)
     yield "/world/obstacles/grid", frame
@@ -157,12 +204,12 @@ def _still_cells(grid: Grid) -> Iterator[tuple[str, Any]]:
 
 
 def _stencil(cells: NDArray[np.bool_]) -> rr.SegmentationImage:
-    """Draw pixels in the colour of obstacles, or not at all."""
+    """Return an image with the colour of obstacles where cells are blocked, else transparent."""
     return rr.SegmentationImage(cells.astype(np.uint8), opacity=1.0, draw_order=-1.5)
 
 
 def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:
-    """Lines that hardly go anywhere: their round ends make a disc, where points have shading."""
+    """Return lines of hardly any length: their round ends make discs; points have shading."""
     ends = centres + length
     centres = centres.astype(np.float32)
     ends = np.maximum(ends.astype(np.float32), np.nextafter(centres, np.float32(np.inf)))
@@ -170,9 +217,9 @@ def _discs(centres: NDArray[Any], length: Any) -> NDArray[np.float32]:
 
 
 def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.Boxes2D:
-    """Boxes of thick lines nested in each other, and an edge: Rerun fills no shapes in 2D."""
+    """Return boxes of thick lines inside each other, and an edge: Rerun fills no 2D shapes."""
     centre, half = (lower + upper) / 2, (upper - lower) / 2
-    # The innermost box is no point: Rerun draws no line that goes nowhere.
+    # The innermost box has a length above 0: Rerun draws no line without length.
     thick = half.min(axis=1) / (1.25 + _OVERLAP * (_LAYERS - 1))
     inset = np.append(_CORNERS, 1 + _OVERLAP * np.arange(_LAYERS))[:, None] * thick
     radii = np.append(_CORNERS, np.ones(_LAYERS))[:, None] * thick
@@ -187,7 +234,7 @@ def _filled_boxes(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> rr.
 
 
 def _filled_polygons(world: World) -> Iterator[tuple[str, Any]]:
-    """Polygons as lines around an image of what they cover: Rerun fills no shapes in 2D."""
+    """Yield an image of what polygons cover, and their outlines: Rerun fills no 2D shapes."""
     pixel = world.extent / _PIXELS
     columns, rows = np.maximum(1, np.ceil((world.upper - world.lower) / pixel)).astype(int)
     y, x = np.mgrid[:rows, :columns]
@@ -206,16 +253,16 @@ def _filled_polygons(world: World) -> Iterator[tuple[str, Any]]:
     )
 
 
-def _still_3d(world: World) -> dict[str, Any]:
+def _archetypes_3d(world: World) -> dict[str, Any]:
     see_through = rr.components.FillMode.TransparentFillMajorWireframe
     size = world.upper - world.lower
-    still: dict[str, Any] = {
+    found: dict[str, Any] = {
         "/world/bounds": rr.Boxes3D(
             mins=[world.lower], sizes=[size], colors=OUTLINE, radii=-0.5, fill_mode="MajorWireframe"
         )
     }
     if len(world.balls):
-        still["/world/obstacles/balls"] = rr.Ellipsoids3D(
+        found["/world/obstacles/balls"] = rr.Ellipsoids3D(
             centers=world.balls[:, :3],
             radii=world.balls[:, 3],
             colors=OBSTACLE_3D,
@@ -223,11 +270,11 @@ def _still_3d(world: World) -> dict[str, Any]:
             line_radii=-0.5,
         )
     if len(world.boxes):
-        still["/world/obstacles/boxes"] = rr.Boxes3D(
+        found["/world/obstacles/boxes"] = rr.Boxes3D(
             mins=world.boxes[:, :3],
             sizes=world.boxes[:, 3:] - world.boxes[:, :3],
             colors=OBSTACLE_3D,
             fill_mode=see_through,
             radii=-0.5,
         )
-    return still
+    return found

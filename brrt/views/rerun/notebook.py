@@ -6,7 +6,7 @@ from brrt.recording import Recording
 
 
 def show(recording: Recording, *, width: int = 1200, height: int = 700) -> Any:
-    """Show a run in a notebook: the cell's last value, or `display` of it.
+    """Return a view of a run for a notebook cell, which shows its last value.
 
     Args:
         recording: The run.
@@ -14,7 +14,7 @@ def show(recording: Recording, *, width: int = 1200, height: int = 700) -> Any:
         height: Height of the viewer in pixels.
 
     Returns:
-        Rerun's viewer where rerun-notebook is installed, and otherwise a figure of matplotlib.
+        Rerun's viewer if rerun-notebook is installed, else a matplotlib figure.
 
     Raises:
         BrrtError: Neither is installed.
@@ -27,11 +27,15 @@ def show(recording: Recording, *, width: int = 1200, height: int = 700) -> Any:
         return plot(recording).figure
     from rerun.notebook import Viewer  # noqa: PLC0415 - costs half a second
 
-    from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - imports rerun
+    from brrt.views.rerun import layout  # noqa: PLC0415 - imports rerun
+    from brrt.views.rerun.drawing import draw_into  # noqa: PLC0415
+    from brrt.views.rerun.stream import new_stream  # noqa: PLC0415
 
+    manifest, world = recording.manifest, recording.world
+    rec = new_stream(layout.recording_id(manifest), layout.application(manifest, world))
     viewer = Viewer(width=width, height=height, use_global_recording=False)
-    sink = RerunSink(recording.manifest, recording.world, embed=viewer)
-    for batch in recording.batches():
-        sink.write(batch)
-    sink.close(recording.result)
+    viewer.add_recording(rec, layout.blueprint(manifest, world))
+    draw_into(rec, recording)
+    rec.flush()
+    rec.disconnect()
     return viewer

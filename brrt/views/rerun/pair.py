@@ -1,6 +1,5 @@
-"""Two runs in one picture: side by side, their plots over each other, and where they part."""
+"""Two runs in one drawing: side by side, with shared plots and a ring where they first differ."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,85 +9,65 @@ import rerun.blueprint as rrb
 from brrt.comparison.difference import Difference
 from brrt.comparison.events import first_difference
 from brrt.events import Events
-from brrt.scenario.manifest import Manifest
-from brrt.views.colours import Colour
+from brrt.recording import Recording
+from brrt.views.colours import RUNS, Colour
 from brrt.views.rerun import layout
 from brrt.views.rerun.arrow import time_columns
-from brrt.views.rerun.draw.canvas import moments
-from brrt.views.rerun.draw.drawing import Drawing
-from brrt.views.rerun.marker import place_of, ring
-from brrt.views.rerun.sink import recording_id
-from brrt.views.rerun.stream import filled, new_stream
-from brrt.worlds.world import World
+from brrt.views.rerun.draw.canvas import times_of
+from brrt.views.rerun.drawing import RunDrawing
+from brrt.views.rerun.ring import draw_ring, place_of
+from brrt.views.rerun.stream import rrd_file
 
-LINES: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
-"""Of the plots, for each run."""
-_SHADES = 0.12
+_LIGHTER = 0.12
 """How much lighter each further line of a run is in one plot."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Side:
-    """One of two runs.
-
-    Attributes:
-        name: What it is called in the picture.
-        manifest: Its manifest.
-        world: Its world.
-        events: Its whole log.
-    """
-
-    name: str
-    manifest: Manifest
-    world: World
-    events: Events
-
-
-def draw_pair(path: Path, left: Side, right: Side) -> Difference | None:
-    """Draw two runs into an .rrd file: the first below `/A`, the second below `/B`.
-
-    The file is for the eye: the exact events stay in the recordings.
+def draw_pair(path: Path, a: Recording, b: Recording) -> Difference | None:
+    """Draw two runs into an .rrd file for the viewer: below the entities `/A` and `/B`.
 
     Args:
         path: The file; it is overwritten.
-        left: The first run.
-        right: The second run.
+        a: The first run.
+        b: The second run.
 
     Returns:
-        The first event that is not the same in both, times apart; None if there is none.
+        The first event that differs in more than its time; None if there is none.
 
     Raises:
-        RecordingError: The file cannot be written.
+        BrrtError: The file cannot be written.
     """
-    difference = first_difference([left.events], [right.events])
-    name = f"{recording_id(left.manifest)}+{recording_id(right.manifest)}"
-    rec = new_stream(name, "brrt pair")  # in a window of its own
-    with filled(rec, _layout(left, right), path, view=False):
-        for letter, side, colour in zip("AB", (left, right), LINES, strict=True):
-            branch: Any = _Branch(rec, f"/{letter}", letter, colour)
-            _draw(branch, side)
+    runs = (a, b)
+    logs = [run.events() for run in runs]
+    difference = first_difference([logs[0]], [logs[1]])
+    name = "+".join(layout.recording_id(run.manifest) for run in runs)
+    # A viewer keeps one layout for each application: this one is not that of a single run.
+    with rrd_file(path, name, "brrt pair", _layout(runs)) as rec:
+        for letter, run, events, colour in zip("AB", runs, logs, RUNS, strict=True):
+            below: Any = _Below(rec, letter, colour)
+            drawing = RunDrawing(below, run.manifest, run.world, f"**{run.name}**\n\n")
+            drawing.write(events)
+            drawing.close(None)
             if difference is not None:
-                other = difference.right if side is left else difference.left
-                place = place_of(side.events, side.manifest, difference.seq, other)
+                other = difference.right if run is a else difference.left
+                place = place_of(events, run.manifest, difference.seq, other)
                 text = f"first difference: event {difference.seq}"
-                ring(branch, side.manifest, side.world, place, text)
+                draw_ring(below, run.manifest, run.world, place, text)
         if difference is not None:
-            _tell(rec, max(left, right, key=lambda side: len(side.events)), difference)
+            _log_difference(rec, max(logs, key=len), difference)
     return difference
 
 
-class _Branch:
-    """A recording below an entity; its plots have a colour of their own.
+class _Below:
+    """A recording stream below an entity; its plots have shades of one colour.
 
     Args:
-        rec: The recording.
-        below: The entity.
-        name: Stands before the names of plots.
+        rec: The stream.
+        letter: The entity, and the first word of the names of plots.
         colour: Of the first line of each plot.
     """
 
-    def __init__(self, rec: rr.RecordingStream, below: str, name: str, colour: Colour) -> None:
-        self._rec, self._below, self._name, self._colour = rec, below, name, colour
+    def __init__(self, rec: rr.RecordingStream, letter: str, colour: Colour) -> None:
+        self._rec, self._letter, self._colour = rec, letter, colour
         self._lines: dict[str, list[str]] = {}
 
     def log(self, entity: str, archetype: Any, *, static: bool = False) -> None:
@@ -96,50 +75,38 @@ class _Branch:
         if isinstance(archetype, rr.SeriesLines):
             archetype = self._line(entity)
         elif isinstance(archetype, rr.SeriesPoints):
-            archetype = rr.SeriesPoints(names=self._name, colors=self._colour, marker_sizes=3)
-        self._rec.log(f"{self._below}{entity}", archetype, static=static)
+            archetype = rr.SeriesPoints(names=self._letter, colors=self._colour, marker_sizes=3)
+        self._rec.log(f"/{self._letter}{entity}", archetype, static=static)
 
     def send_columns(self, entity: str, indexes: Any, columns: Any) -> None:
         """Send columns below the entity."""
-        self._rec.send_columns(f"{self._below}{entity}", indexes, columns)
+        self._rec.send_columns(f"/{self._letter}{entity}", indexes, columns)
 
     def _line(self, entity: str) -> rr.SeriesLines:
         plot, _, name = entity.removeprefix("/series/").partition("/")
         lines = self._lines.setdefault(plot, [])
         if name not in lines:
             lines.append(name)
-        light = 1 - (1 - _SHADES) ** lines.index(name)
+        light = 1 - (1 - _LIGHTER) ** lines.index(name)
         colour = [round(value + light * (255 - value)) for value in self._colour]
-        text = f"{self._name} {name}".replace("_", " ").strip()
+        text = f"{self._letter} {name}".replace("_", " ").strip()
         return rr.SeriesLines(names=text, colors=colour, widths=1.5)
 
 
-def _draw(branch: Any, side: Side) -> None:
-    drawing = Drawing(branch, side.manifest, side.world)
-    drawing.write(side.events)
-    drawing.close()
-    text = f"**{side.name}**\n\n{layout.document(side.manifest)}"
-    branch.log("/run", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-
-
-def _tell(rec: Any, side: Side, difference: Difference) -> None:
-    """Write to the log where the runs part."""
-    until = side.events.until(seq=difference.seq)
+def _log_difference(rec: Any, events: Events, difference: Difference) -> None:
+    """Add a line to the text log at the first event that differs."""
+    until = events.until(seq=difference.seq)
     last = max((table[-1] for table in until.tables.values()), key=lambda row: int(row["seq"]))
-    told = rr.TextLog.columns(text=[f"the runs part at {difference}"], level=["WARN"])
-    rec.send_columns("/difference", time_columns(moments([last])), told)
+    text = rr.TextLog.columns(text=[f"the runs part at {difference}"], level=["WARN"])
+    rec.send_columns("/difference", time_columns(times_of([last])), text)
 
 
-def _title(side: Side) -> str:
-    scenario = side.manifest.scenario
-    return f"{side.name} ({scenario.planner}, seed {scenario.seed})"
-
-
-def _layout(left: Side, right: Side) -> rrb.Blueprint:
-    worlds = [
-        layout.world_view(side.world, below=f"/{letter}", name=f"{letter}: {_title(side)}")
-        for letter, side in (("A", left), ("B", right))
-    ]
+def _layout(runs: tuple[Recording, Recording]) -> rrb.Blueprint:
+    worlds = []
+    for letter, run in zip("AB", runs, strict=True):
+        scenario = run.manifest.scenario
+        title = f"{letter}: {run.name} ({scenario.planner}, seed {scenario.seed})"
+        worlds.append(layout.world_view(run.world, below=f"/{letter}", name=title))
     log = rrb.TextLogView(
         origin="/",
         contents=["/difference", "/A/log", "/B/log"],
@@ -148,19 +115,11 @@ def _layout(left: Side, right: Side) -> rrb.Blueprint:
             timeline_columns=["iteration"], text_log_columns=["entitypath", "body"]
         ),
     )
-    runs = [rrb.TextDocumentView(origin=f"/{each}/run", name=each) for each in "AB"]
+    documents = [rrb.TextDocumentView(origin=f"/{each}/run", name=each) for each in "AB"]
     plots = layout.plots("/A", "/B")
     shares = [3] * len(plots) + [5, 4]
-    below = rrb.Horizontal(*plots, log, rrb.Tabs(*runs), column_shares=shares)
-    driven = any(side.manifest.scenario.execute for side in (left, right))
-    return rrb.Blueprint(
+    below = rrb.Horizontal(*plots, log, rrb.Tabs(*documents), column_shares=shares)
+    return layout.framed(
         rrb.Vertical(rrb.Horizontal(*worlds), below, row_shares=[7, 3]),
-        rrb.TimePanel(
-            state="collapsed",
-            timeline="event" if driven else "iteration",
-            play_state="paused",
-            fps=100,
-        ),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
+        executed=any(run.manifest.scenario.execute for run in runs),
     )

@@ -14,8 +14,8 @@ from brrt.formats.rrd.outline import CHECK, END, EVENTS, MANIFEST, OURS, WORLD, 
 from brrt.recording import Result
 from brrt.scenario.manifest import Manifest
 from brrt.views.rerun.arrow import event_columns, time_columns
-from brrt.views.rerun.draw.drawing import Drawing
-from brrt.views.rerun.layout import application, blueprint, document
+from brrt.views.rerun.drawing import RunDrawing
+from brrt.views.rerun.layout import application, blueprint, recording_id
 from brrt.views.rerun.pipe import Drain
 from brrt.views.rerun.stream import connect, new_stream
 from brrt.views.viewer import process
@@ -42,7 +42,6 @@ class RerunSink:
         path: The file; it is overwritten.
         view: Open Rerun's viewer, or use one that is open, and show the events as they come. A
             viewer that is closed meanwhile does not disturb the run.
-        embed: Show them in this viewer of a notebook (`rerun.notebook.Viewer`) instead.
 
     Raises:
         RecordingError: The file cannot be written, or there is no viewer.
@@ -55,13 +54,11 @@ class RerunSink:
         *,
         path: Path | str | None = None,
         view: bool = False,
-        embed: Any = None,
     ) -> None:
         self._manifest, self._view = manifest, view
         self._path = None if path is None else Path(path)
         self._counts = dict.fromkeys(Kind, 0)
-        live = view or embed is not None
-        self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if live else _FILE_S)
+        self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if view else _FILE_S)
         self._chunk = max(256, _WINDOW // (8 * manifest.dof + 5))
         self._layout = blueprint(manifest, world)
         self._rec: Any = new_stream(recording_id(manifest), application(manifest, world))
@@ -69,13 +66,10 @@ class RerunSink:
             process.open_viewer()
         self._drain = None if self._path is None else Drain(self._path)
         try:
-            if embed is None:
-                first = blueprint(manifest, world, live=True) if view else self._layout
-                connect(self._rec, first, self._drain, view=view)
-            else:
-                embed.add_recording(self._rec, self._layout)
+            first = blueprint(manifest, world, live=True) if view else self._layout
+            connect(self._rec, first, self._drain, view=view)
             self._write_head(world)
-            self._drawing = Drawing(self._rec, manifest, world)
+            self._drawing = RunDrawing(self._rec, manifest, world)
             self._flush()
         except BaseException:
             self._rec.disconnect()
@@ -104,12 +98,11 @@ class RerunSink:
             return
         try:
             self._write(self._gathering.take())
-            self._drawing.close()
+            self._drawing.close(result)
             end = {"events": str(sum(self._counts.values())), "stamp": WRITTEN}
             if result is not None:
                 end["result"] = json.dumps(result)
                 end["counts"] = json.dumps({kind.label: n for kind, n in self._counts.items()})
-                self._document(document(self._manifest, result))
             self._write_texts(END, end)
             if self._view:  # the file is to open at its beginning, though the viewer is at the end
                 self._rec.send_blueprint(self._layout, make_active=False)
@@ -156,15 +149,10 @@ class RerunSink:
         }
         for entity, text in texts.items():
             self._write_texts(entity, {"json": text})
-        self._document(document(self._manifest))
 
     def _write_texts(self, entity: str, texts: dict[str, str]) -> None:
         value = rr.DynamicArchetype(archetype(entity), components=texts)
         self._rec.log(entity, value, static=True)
-
-    def _document(self, text: str) -> None:
-        markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
-        self._rec.log("/run", markdown, static=True)
 
     def _flush(self) -> None:
         """Hand everything on now: a killed run leaves all but its last batch.
@@ -187,8 +175,3 @@ class RerunSink:
             # Someone has closed the viewer. The file, which has its own way out, goes on.
         if self._drain is not None:
             self._drain.settle()
-
-
-def recording_id(manifest: Manifest) -> str:
-    """Name a recording: equal for runs that are the same in everything, the clock included."""
-    return f"{manifest.scenario.planner}-{manifest.digest()[:16]}"

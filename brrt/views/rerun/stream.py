@@ -8,6 +8,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
+from brrt.files import replacing
 from brrt.views.rerun.pipe import Drain
 from brrt.views.viewer import process
 
@@ -38,26 +39,53 @@ def connect(rec: Any, layout: rrb.Blueprint, drain: Drain | None, *, view: bool)
 
 
 @contextmanager
-def filled(rec: Any, layout: rrb.Blueprint, path: Path | None, *, view: bool) -> Iterator[None]:
-    """Let a stream take what the body logs, and end it.
+def rrd_file(
+    path: Path, name: str, application: str, layout: rrb.Blueprint
+) -> Iterator[rr.RecordingStream]:
+    """Collect what the body logs, and write it to an .rrd file at the end.
+
+    Rerun's own file writer may hang when a write fails, so the bytes pass through memory.
 
     Args:
-        rec: The stream.
+        path: The file; it appears once it is complete, and replaces an older one.
+        name: See `new_stream`.
+        application: See `new_stream`.
         layout: How a viewer shows it.
-        path: The file; it is overwritten.
-        view: Open the viewer, or use one that is open.
 
     Raises:
-        RecordingError: The file cannot be written, or there is no viewer.
+        BrrtError: The file cannot be written.
     """
-    if view:
-        process.open_viewer()
-    drain = None if path is None else Drain(path)
+    rec = new_stream(name, application)
     try:
-        connect(rec, layout, drain, view=view)
-        yield
+        buffer = rec.binary_stream()
+        rec.send_blueprint(layout, make_active=False)
+        yield rec
+        data = buffer.read(flush=True) or b""
+    finally:
+        rec.disconnect()
+    with replacing(path) as unfinished:
+        unfinished.write_bytes(data)
+
+
+@contextmanager
+def viewer_stream(
+    name: str, application: str, layout: rrb.Blueprint
+) -> Iterator[rr.RecordingStream]:
+    """Show what the body logs in the open viewer, or in one that is opened for it.
+
+    Args:
+        name: See `new_stream`.
+        application: See `new_stream`.
+        layout: How the viewer shows it.
+
+    Raises:
+        RecordingError: There is no viewer.
+    """
+    process.open_viewer()
+    rec = new_stream(name, application)
+    try:
+        connect(rec, layout, None, view=True)
+        yield rec
         rec.flush()
     finally:
         rec.disconnect()
-        if drain is not None:
-            drain.close()

@@ -1,1 +1,1 @@
-"""The Rerun viewer as a process: start it, steer it, serve it to a browser."""
+"""Rerun's viewer: its processes, control of a window, and a server for the browser."""

@@ -1,4 +1,4 @@
-"""Rerun's viewer, driven from here: opened at an instant, in a window or without one, pictured."""
+"""Rerun's viewer under control: open a drawing at an instant, in a window or for a picture."""
 
 import time
 from collections.abc import Iterator
@@ -10,12 +10,12 @@ import numpy as np
 from rerun.experimental import ViewerClient
 
 from brrt.errors import RecordingError
-from brrt.views.viewer.process import PAUSE_S, Program, connect, free_port, telling
+from brrt.views.viewer.process import PAUSE_S, Program, connect, free_port, viewer_errors
 
 LOAD_S, STILL_S = 600.0, 60.0
-"""Seconds that the viewer gets to load a recording, and to draw it."""
+"""Time limits of the viewer to load a file, and to draw it."""
 _EMPTY_S = 2.0
-"""After which a recording that has no times yet has none: nothing happened in it."""
+"""A file without times after that has no events."""
 
 
 class Cursor(NamedTuple):
@@ -25,26 +25,23 @@ class Cursor(NamedTuple):
     value: int
 
 
-def show(run: Path, cursor: Cursor | None, *marks: Path) -> None:
-    """Open a recording in a window of its own; the window outlives us.
+def show(file: Path, cursor: Cursor | None) -> None:
+    """Open a file in a new window, which stays open when this process ends.
 
-    One that is open goes on showing what somebody looks at.
-
-    The viewer holds on to the file: once this returns, its name may go.
+    The viewer keeps the file open: it may be deleted afterwards.
 
     Args:
-        run: An .rrd file.
-        cursor: Where to open it; None leaves that to the recording.
-        marks: Files of the same recording with more to show.
+        file: An .rrd file.
+        cursor: The instant; None takes that of the file.
 
     Raises:
-        RecordingError: There is no viewer, or it does not take the recording.
+        RecordingError: There is no viewer, or it rejects the file.
     """
     port = free_port()
     program = Program(f"--port={port}", "--hide-welcome-screen")
     try:
-        with telling("open the recording", program):
-            _load(connect(port, program), run, cursor, *marks)
+        with viewer_errors("open the recording", program):
+            _load(connect(port, program), file, cursor)
         program.leave()
     except BaseException:
         program.stop()
@@ -52,27 +49,24 @@ def show(run: Path, cursor: Cursor | None, *marks: Path) -> None:
 
 
 def screenshot(
-    run: Path,
+    file: Path,
     picture: Path,
     cursor: Cursor | None = None,
     size: tuple[int, int] = (1600, 1000),
-    *marks: Path,
 ) -> None:
-    """Write a picture of a recording in the viewer as a PNG; no screen is needed.
+    """Write a picture of a file in the viewer as a PNG; no screen is needed.
 
     Args:
-        run: An .rrd file.
-        picture: The file to write.
-        cursor: Which instant; None leaves that to the recording.
+        file: An .rrd file.
+        picture: The PNG to write.
+        cursor: The instant; None takes that of the file.
         size: Width and height in pixels.
-        marks: Files of the same recording with more to show.
 
     Raises:
-        RecordingError: The viewer cannot run here, or does not come to rest.
+        RecordingError: The viewer cannot run, or its picture does not come to rest.
     """
     with headless(size) as client:
-        _load(client, run, cursor, *marks)
-        png = shoot(client, run, cursor)
+        png = shoot(client, file, cursor)
     try:
         picture.write_bytes(png)
     except OSError as error:
@@ -81,57 +75,56 @@ def screenshot(
 
 @contextmanager
 def headless(size: tuple[int, int]) -> Iterator[ViewerClient]:
-    """Run a viewer without a window; it ends with the body.
+    """Run a viewer without a window until the body ends.
 
     Raises:
-        RecordingError: It cannot run here, or fails in what the body asks of it.
+        RecordingError: The viewer cannot run, or fails in the body.
     """
     port, (width, height) = free_port(), size
     program = Program(
         "--headless", f"--port={port}", f"--window-size={width}x{height}", "--hide-welcome-screen"
     )
     try:
-        with telling("picture the recording", program):
+        with viewer_errors("picture the recording", program):
             yield connect(port, program)
     finally:
         program.stop()
 
 
-def shoot(client: ViewerClient, run: Path, cursor: Cursor | None, view: str | None = None) -> bytes:
-    """Return a picture of a recording, as a PNG, once it stands still.
+def shoot(
+    client: ViewerClient, file: Path, cursor: Cursor | None, view: str | None = None
+) -> bytes:
+    """Return a picture of a file in the viewer, as a PNG, once it is at rest.
 
     Args:
         client: The viewer.
-        run: An .rrd file; a viewer that has it open already only shows it.
-        cursor: Which instant; None leaves that to the recording.
-        view: Which view of it, by its name; None takes the whole viewer.
+        file: An .rrd file; a viewer that has opened it before shows it again.
+        cursor: The instant; None takes that of the file.
+        view: Title of one view; None takes the whole window.
 
     Raises:
-        RecordingError: It does not come to rest.
+        RecordingError: The picture does not come to rest.
     """
-    _load(client, run, cursor)
+    _load(client, file, cursor)
     end = time.monotonic() + STILL_S
     views = {each.name: each.view_id for each in client.get_state().views}
     last = b""
     while time.monotonic() < end:
         png = client.take_screenshot(None if view is None else views[view])
-        # While chunks are still fetched, a wheel turns in the picture.
-        if png == last:
+        if png == last:  # while chunks are loaded, a spinner turns
             return png
         last = png
         time.sleep(PAUSE_S)
-    raise RecordingError(f"{run}: its picture does not come to rest within {STILL_S:.0f} s")
+    raise RecordingError(f"{file}: its picture does not come to rest within {STILL_S:.0f} s")
 
 
-def _load(client: ViewerClient, run: Path, cursor: Cursor | None, *marks: Path) -> None:
-    """Open a recording, wait for all of it, and go to an instant."""
-    stores = client.open(str(run.resolve())).store_ids
+def _load(client: ViewerClient, file: Path, cursor: Cursor | None) -> None:
+    """Open a file, wait until all of it is loaded, and go to an instant."""
+    stores = client.open(str(file.resolve())).store_ids
     if not stores:
-        said = [entry.message for entry in client.get_logs() if entry.level == "ERROR"]
-        reason = said[-1].splitlines()[0] if said else "it does not say why"
-        raise RecordingError(f"{run}: the Rerun viewer does not take it: {reason}")
-    for mark in marks:
-        client.open(str(mark.resolve()))
+        errors = [entry.message for entry in client.get_logs() if entry.level == "ERROR"]
+        reason = errors[-1].splitlines()[0] if errors else "no reason given"
+        raise RecordingError(f"{file}: the Rerun viewer rejects the file: {reason}")
     begin = time.monotonic()
     while time.monotonic() < begin + LOAD_S:
         state = client.get_state()
@@ -145,7 +138,7 @@ def _load(client: ViewerClient, run: Path, cursor: Cursor | None, *marks: Path) 
             elif time.monotonic() > begin + _EMPTY_S:
                 return
         time.sleep(PAUSE_S)
-    raise RecordingError(f"{run}: the Rerun viewer does not show it within {LOAD_S:.0f} s")
+    raise RecordingError(f"{file}: the Rerun viewer does not show it within {LOAD_S:.0f} s")
 
 
 def _time(cursor: Cursor) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Rerun's viewer as a process of its own: its program, where it listens, and opening it."""
+"""The processes of Rerun's viewer: start one, connect to it, or find the one that is open."""
 
 import importlib.util
 import os
@@ -16,46 +16,45 @@ from rerun.experimental import ViewerClient
 from brrt.errors import RecordingError
 
 HERE, PORT = "127.0.0.1", 9876
-"""Where the viewer listens that live runs are sent to."""
+"""Address of the viewer for live runs."""
 START_S = 60.0
-"""Seconds that a viewer gets to start."""
+"""Time limit of a viewer to start."""
 PAUSE_S = 0.25
-"""Between two looks at what a viewer does."""
+"""Between two requests to a viewer."""
 _DYING_S = 3.0
-"""Within which a viewer that does not answer any more may turn out to have ended."""
+"""A viewer that stops answering may end within that time, and give a reason."""
 _HELLO = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))
-"""How a gRPC client begins: the preface of HTTP/2 and settings, none (RFC 9113, sections 3.4 and
-6.5)."""
+"""First bytes of a gRPC client: HTTP/2's preface and empty settings (RFC 9113, 3.4 and 6.5)."""
 _SETTINGS = 4
-"""The type of the frame that the server answers with."""
+"""Type of the frame with which the server answers."""
 _HELLO_S = 3.0
 _ENVIRONMENT = {"RERUN_APP_ONLY": "true", "NO_COLOR": "1", "RUST_LOG": "error"}
-"""What it logs as news, it also shows above the picture for a while, if it is slow to start."""
+"""A viewer that starts slowly would show its log messages above the picture."""
 _NO_DRIVER = ("graphics adapter", "render context", "shared libraries", "Vulkan")
-"""What it says as it dies for want of a driver."""
+"""Words in the output of a viewer that ends because there is no driver."""
 
 
 def address(port: int | None = None) -> str:
-    """Where a viewer listens."""
+    """Return the address of a viewer."""
     return f"rerun+http://{HERE}:{PORT if port is None else port}/proxy"
 
 
 def program() -> str | None:
-    """Return the viewer's own file: the script `rerun` is a wrapper whose child outlives it."""
+    """Return the viewer's executable; the script `rerun` is a wrapper that does not end it."""
     own = importlib.util.find_spec("rerun_cli")
     folder = None if own is None or own.origin is None else str(Path(own.origin).parent)
-    # Rerun looks for its viewer on the PATH alone, where a venv that is not activated is missing.
+    # Rerun itself searches the PATH only, which lacks a venv that is not activated.
     return shutil.which("rerun", path=folder) or shutil.which("rerun")
 
 
 class Program:
-    """The viewer's program, as a process of ours that listens on this machine alone.
+    """A process of the viewer that listens on this machine only.
 
     Args:
-        options: Its options.
+        options: Options of the executable.
 
     Raises:
-        RecordingError: It is not installed.
+        RecordingError: The viewer is not installed.
     """
 
     def __init__(self, *options: str) -> None:
@@ -63,8 +62,8 @@ class Program:
         if file is None:
             raise RecordingError("there is no Rerun viewer; pip install rerun-sdk brings it")
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `leave` or `stop`
-        # A session of its own: Ctrl-C in the terminal reaches us alone, and we end it in order.
-        self._process = subprocess.Popen(  # noqa: S603 - our own viewer
+        # A session of its own: Ctrl-C in the terminal reaches only brrt, which then stops it.
+        self._process = subprocess.Popen(  # noqa: S603 - the viewer of rerun-sdk
             [file, f"--bind={HERE}", *options],
             stdin=subprocess.DEVNULL,
             stdout=self._log,
@@ -74,39 +73,35 @@ class Program:
         )
 
     def check(self) -> None:
-        """See that it still runs.
+        """Check that the process runs.
 
         Raises:
-            RecordingError: It does not; with the reason, and what helps.
+            RecordingError: It has ended; the message has the reason and what to do.
         """
         if self._process.poll() is None:
             return
-        said = self.said()
-        if any(text in said for text in _NO_DRIVER):
+        self._log.seek(0)
+        output = self._log.read().decode(errors="replace")
+        if any(text in output for text in _NO_DRIVER):
             raise RecordingError(
-                "the Rerun viewer found no graphics driver; a software one will do "
+                "the Rerun viewer found no graphics driver; a software one is enough "
                 "(Debian: apt install mesa-vulkan-drivers libvulkan1 libegl1 libgl1-mesa-dri "
                 "libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2)"
             )
-        lines = said.strip().splitlines() or ["it said nothing"]
+        lines = output.strip().splitlines() or ["no reason given"]
         raise RecordingError(f"the Rerun viewer ended: {lines[-1]}")
 
-    def said(self) -> str:
-        """Return what it has written so far."""
-        self._log.seek(0)
-        return self._log.read().decode(errors="replace")
-
     def wait(self) -> None:
-        """Wait until it ends by itself."""
+        """Wait until the process ends by itself."""
         self._process.wait()
 
     def leave(self) -> None:
-        """Let it outlive us, and this object."""
+        """Let the process run on when this one ends."""
         self._log.close()
-        self._process.returncode = 0  # else Python warns that nobody has waited for it
+        self._process.returncode = 0  # without it Python warns about a running child
 
     def stop(self) -> None:
-        """End it, and wait for that."""
+        """End the process."""
         self._process.terminate()
         try:
             self._process.wait(timeout=5)
@@ -117,37 +112,35 @@ class Program:
 
 
 def is_taken(port: int) -> bool:
-    """Whether something listens at a port of this machine."""
+    """Return whether a program listens at a port of this machine."""
     with socket.socket() as probe:
         probe.settimeout(1)
         return probe.connect_ex((HERE, port)) == 0
 
 
 def free_port() -> int:
-    """Return a port that nobody listens at."""
+    """Return a free port."""
     with socket.socket() as probe:
         probe.bind((HERE, 0))
         return int(probe.getsockname()[1])
 
 
 def open_viewer() -> None:
-    """Open a viewer that streams can be sent to, or find the one that is open.
-
-    Its window outlives us.
+    """Open the viewer for live runs unless it is open; its window stays when this process ends.
 
     Raises:
-        RecordingError: It does not start, or something else listens in its place.
+        RecordingError: It does not start, or another program listens at its port.
     """
     if is_taken(PORT):
         if not _answers(PORT):
             raise RecordingError(
-                f"something that is no Rerun viewer, or does not answer, listens at port {PORT}; "
-                f"end it, or write a file (--rrd) and look at that"
+                f"the program at port {PORT} is not a Rerun viewer, or does not answer; end it, or "
+                f"write a file with --rrd and open that"
             )
         return
     window = Program(f"--port={PORT}", "--hide-welcome-screen")
     try:
-        with telling("open", window):
+        with viewer_errors("open", window):
             connect(PORT, window)
         window.leave()
     except BaseException:
@@ -156,7 +149,7 @@ def open_viewer() -> None:
 
 
 def _answers(port: int) -> bool:
-    """Whether a gRPC server is at a port: a client would wait for ever for what is none."""
+    """Return whether a gRPC server listens at a port; a client waits forever for another one."""
     try:
         with socket.create_connection((HERE, port), timeout=_HELLO_S) as probe:
             probe.sendall(_HELLO)
@@ -166,7 +159,7 @@ def _answers(port: int) -> bool:
 
 
 def connect(port: int, program: Program) -> ViewerClient:
-    """Wait for a viewer to answer."""
+    """Connect to a viewer that is starting."""
     end = time.monotonic() + START_S
     while True:
         program.check()
@@ -185,8 +178,8 @@ def connect(port: int, program: Program) -> ViewerClient:
 
 
 @contextmanager
-def telling(what: str, program: Program) -> Iterator[None]:
-    """Turn what the viewer's client raises into one line; a viewer that dies says why itself."""
+def viewer_errors(what: str, program: Program) -> Iterator[None]:
+    """Turn errors of the client into one line, or into the reason why the viewer ended."""
     try:
         yield
     except (OSError, RuntimeError) as error:

@@ -1,4 +1,4 @@
-"""Rerun's viewer in the browser: a server on this machine alone."""
+"""Rerun's viewer in the browser: a server for this machine only."""
 
 import time
 from pathlib import Path
@@ -9,34 +9,34 @@ from brrt.views.viewer import process
 from brrt.views.viewer.process import HERE, START_S, Program, free_port, is_taken
 
 PORT = 9090
-"""Where the page is, if nothing else is there."""
+"""Of the page, unless another program listens there."""
 _PAUSE_S = 0.1
 
 
 class Server:
-    """A page with a recording, as long as the object is not closed.
+    """A web page with a drawing; it exists until `close`.
 
     Args:
-        run: An .rrd file; it must stay.
-        port: Where the page is to be; None takes `PORT`, or a free one.
+        file: An .rrd file, which must not be deleted meanwhile.
+        port: Port of the page; None takes `PORT` if it is free, else another one.
 
     Attributes:
-        address: What to open in the browser.
+        address: Address of the page.
 
     Raises:
         BrrtError: The port is taken.
         RecordingError: The server does not start.
     """
 
-    def __init__(self, run: Path, port: int | None = None) -> None:
+    def __init__(self, file: Path, port: int | None = None) -> None:
         if port is not None and is_taken(port):
             raise BrrtError(
-                f"port {port} is taken; choose another one, or name none to get a free one"
+                f"port {port} is taken; choose another one, or leave --port out to get a free one"
             )
         page = port or (free_port() if is_taken(PORT) else PORT)
         events = free_port()
         self._program = Program(
-            str(run), "--serve-web", f"--port={events}", f"--web-viewer-port={page}"
+            str(file), "--serve-web", f"--port={events}", f"--web-viewer-port={page}"
         )
         source = quote(process.address(events), safe="")
         self.address = f"http://{HERE}:{page}/?theme=dark&url={source}"
@@ -47,10 +47,10 @@ class Server:
             raise
 
     def wait(self) -> None:
-        """Wait for the server's end.
+        """Wait until the server ends.
 
         Raises:
-            RecordingError: It has ended, though nobody closed it.
+            RecordingError: It has ended without `close`.
         """
         self._program.wait()
         self._program.check()

@@ -1,1 +1,1 @@
-"""What of a run is drawn in Rerun: trees, paths, cells, moves."""
+"""The parts of a drawing in Rerun: trees, cells, paths, plots and what they share."""

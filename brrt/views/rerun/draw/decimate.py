@@ -1,4 +1,4 @@
-"""What a drawing knows of nodes or cells: where they are, and which of them are worth drawing."""
+"""Which nodes, cells and other items are drawn where there are many; where drawn nodes are."""
 
 from typing import Any
 
@@ -8,38 +8,37 @@ from numpy.typing import NDArray
 from brrt.worlds.world import World
 
 DRAWN_IN_FULL = 100_000
-"""Nodes up to which every edge is drawn; `benchmarks/scrubbing.py` tells what a viewer makes of
-them."""
+"""Nodes up to which every edge is drawn; `benchmarks/scrubbing.py` measures how fast viewers are
+with them."""
 
 IN_FULL, STRIDE = 10_000, 16
-"""Items of a kind that stay for a moment, as samples do: so many are all drawn, then one of 16."""
+"""Transient items of a kind, such as samples, up to which all are drawn; later ones one in 16."""
 
 _CELLS = 1 << 16
-"""Cells of the grid over the world that thins out what comes after: a cell then takes one edge. So
-a million edges stay a picture that a viewer can turn, and yet every place that is reached shows."""
+"""Cells of the grid over the world that decimates later nodes, one edge a cell: a viewer can turn
+the picture of a million edges, and every place that the tree reaches is shown."""
 
 _KEPT_NODES = 1 << 19
-"""Nodes whose places are kept (16 bytes each in 3D); edges that leave from later ones are not
-drawn."""
+"""Nodes whose places are kept (16 bytes each in 3D); edges from later ones are not drawn."""
 
 
-def thinned(first: int, count: int) -> NDArray[np.int64]:
-    """Return which of some items that stay for a moment are drawn, of which some came before."""
+def one_in_stride(first: int, count: int) -> NDArray[np.int64]:
+    """Return which of `count` transient items are drawn, with `first` items before them."""
     end, few = first + count, max(first, IN_FULL)
     number = np.arange(first, min(end, IN_FULL)), np.arange(few + -few % STRIDE, end, STRIDE)
     return np.concatenate(number) - first
 
 
-class Thinning:
-    """Takes everything up to a number, and then what reaches new places.
+class Decimation:
+    """Keeps every item up to a number, and later ones only where they reach new cells of a grid.
 
     Args:
-        world: Where these are.
+        world: The world that the grid covers.
         full: The number; None takes `DRAWN_IN_FULL`.
-        cells: Of the grid over the world, about; None takes `_CELLS`.
+        cells: Cells of the grid, about; None takes `_CELLS`.
 
     Attributes:
-        count: Items that have come.
+        count: Items so far.
         full: As given.
     """
 
@@ -51,8 +50,8 @@ class Thinning:
         self._grid = (side,) * world.dim
         self._taken = np.zeros(side**world.dim, np.bool_)
 
-    def worth(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Tell which of the next items are worth drawing, by their places, shape (n, dim)."""
+    def keep(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Return which of the next items to draw, by their places, shape (n, dim)."""
         steps = (places - self._lower) * self._scale
         steps = np.clip(steps, 0, np.array(self._grid) - 1).astype(np.intp)
         cells = np.ravel_multi_index(tuple(steps.T), self._grid)
@@ -67,70 +66,70 @@ class Thinning:
         self.count += len(places)
         return wanted
 
-    def begins_within(self, count: int) -> bool:
-        """Whether it first left something out among the last so many items."""
+    def began_within(self, count: int) -> bool:
+        """Return whether the last `count` items are the first that were not all kept."""
         return self.count - count <= self.full < self.count
 
 
-class Sketch:
-    """The nodes of a tree, or the cells of a lattice, as far as they have come.
+class DrawnNodes:
+    """The nodes of a tree, or the cells of a lattice, that have appeared so far.
 
     Args:
-        world: Where they are.
-        thinning: What decides which of them are worth drawing.
+        world: The world that they are in.
+        decimation: Decides which of them are drawn; None takes the default.
 
     Attributes:
-        drawn: Nodes that were worth drawing; each has a slot, numbered from 0.
-        thinning: As given.
+        drawn: Number of drawn nodes; each has a slot, numbered from 0.
+        decimation: As given.
     """
 
-    def __init__(self, world: World, thinning: Thinning | None = None) -> None:
-        self.drawn, self.thinning = 0, thinning or Thinning(world)
+    def __init__(self, world: World, decimation: Decimation | None = None) -> None:
+        self.drawn, self.decimation = 0, decimation or Decimation(world)
         self._places = np.full((1024, world.dim), np.nan, np.float32)
         self._slots = np.full(1024, -1, np.int32)
 
     @property
-    def nodes(self) -> int:
-        """Nodes that have joined."""
-        return self.thinning.count
+    def count(self) -> int:
+        """Nodes so far, drawn or not."""
+        return self.decimation.count
 
-    def join(
+    def add(
         self, nodes: NDArray[np.int32], places: NDArray[np.float32], wanted: NDArray[np.bool_]
     ) -> NDArray[np.int64]:
-        """Take in new nodes.
+        """Add new nodes.
 
         Args:
             nodes: Their numbers, shape (n,).
             places: Where they are, shape (n, dim).
-            wanted: Whether they are to be drawn if they are worth it.
+            wanted: Which of them may be drawn, shape (n,).
 
         Returns:
-            Which of them have got the next slots.
+            Indices of those that are drawn; they have got the next slots.
         """
-        which = np.flatnonzero(wanted & self.thinning.worth(places))
+        which = np.flatnonzero(wanted & self.decimation.keep(places))
         self._make_room(nodes)
         slots = np.full(len(nodes), -1, np.int32)
         slots[which] = np.arange(self.drawn, self.drawn + len(which))
         kept: Any = (nodes >= 0) & (nodes < _KEPT_NODES)
-        kept = slice(None) if kept.all() else kept  # which spares copies
+        kept = slice(None) if kept.all() else kept  # a slice makes no copies
         self._places[nodes[kept]] = places[kept]
         self._slots[nodes[kept]] = slots[kept]
         self.drawn += len(which)
         return which
 
     def places(self, nodes: NDArray[np.int32]) -> NDArray[np.float32]:
-        """Where nodes are, shape (n, dim); NaN, which no viewer draws, where that is not kept."""
+        """Return where nodes are, shape (n, dim); NaN, which viewers skip, where unknown."""
         found = self._places.take(nodes, axis=0, mode="clip")
         found[(nodes < 0) | (nodes >= len(self._places))] = np.nan
         return found
 
     def knows(self, nodes: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Whether nodes have joined, as far as that is kept: later ones pass for known."""
+        """Return which nodes have been added; those beyond `_KEPT_NODES` count as added."""
         found = np.isfinite(self.places(nodes)).all(axis=1)
         return np.asarray(found | (nodes >= _KEPT_NODES))
 
     def slots(self, nodes: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Slots of nodes, shape (n,); -1 for those that are not drawn."""
+        """Return the slots of nodes, shape (n,); -1 for those that are not drawn."""
         found = self._slots.take(nodes, mode="clip")
         found[(nodes < 0) | (nodes >= len(self._slots))] = -1
         return found

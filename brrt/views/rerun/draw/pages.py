@@ -1,15 +1,16 @@
-"""Drawings that change: items on pages, and a page is logged anew when something on it did.
+"""Drawings whose items change: items lie on pages, and a changed page is logged anew.
 
-Of an entity that changes, a viewer shows the newest row up to the cursor, so that a page is right
-wherever the cursor goes. What that costs is bounded in three ways:
+Of an entity that changes, a viewer shows the newest row up to the cursor, so a page is right
+wherever the cursor goes. Three bounds keep the cost low:
 
 - There are at most `_MOST_PAGES`: when they are full, each takes twice as many items. More would
   not help: by the time a row pays, something has changed on nearly every page.
-- Changed pages are logged when `_PER_CHANGE` items a change have been saved up for the ones logged
-  before, and, once there have been many changes, a fraction of that. So the rows stay in proportion
-  to the events, and the picture lags behind by 3 % or so of its changes; by none at first.
-- The rows of a page are sent together, at most some times a second: a chunk takes a kilobyte and
-  a quarter of a millisecond, and within one compression finds that the rows hardly differ.
+- Changed pages are logged once there have been as many changes since the last time as pay for the
+  items logged then, `_PER_CHANGE` items a change, and, after many changes, a fraction of them. So
+  the rows stay in proportion to the events; the picture lags by about 3 % of its changes, at first
+  by none.
+- The rows of a page are sent together, at most a few times a second: a chunk takes a kilobyte and
+  a quarter of a millisecond, and similar rows within one compress well.
 """
 
 import time
@@ -20,36 +21,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Table
-from brrt.views.rerun.draw.canvas import MOMENT, Canvas, moments
+from brrt.views.rerun.draw.canvas import TIMES, Canvas, times_of
 
 _MOST_PAGES, _FIRST_SIZE = 64, 32
-"""Pages at most, and items on a page as long as that suffices. With 100,000 items on them, a row
-and the one before it are still within the 64 kB in which compression finds what comes again."""
+"""Pages at most, and items on a page at first. With 100,000 items on all pages, a row and the one
+before it are still within the 64 kB in which the compression finds repetitions."""
 
 _PER_CHANGE, _MANY_CHANGES, _PER_CHANGE_OF_MANY = 16, 100_000, 4
-"""Items that may be logged for each change; and beyond so many changes."""
+"""Items that may be logged for each change, and the same beyond `_MANY_CHANGES`."""
 
 _MOST_UNSEEN = 1000
-"""Changes so far for each one that waits in any case: taking rows costs time, however small."""
+"""A page waits for one change in `_MOST_UNSEEN` in any case: each row costs time, however small."""
 
 _SEND_S = 0.5
 """Seconds for which rows are gathered."""
 
 Items = NDArray[Any]
-Builder = Callable[[Items], Any]
 
 
-class _Rows(NamedTuple):
-    """A row of each of some pages, taken at one moment.
+class _PageRows(NamedTuple):
+    """A row of each of some pages, all at one time.
 
     Attributes:
-        moment: When.
-        pages: Their numbers, shape (n,).
+        time: The time, as in `TIMES`.
+        pages: Numbers of the pages, shape (n,).
         counts: Items on each, shape (n,).
-        items: All of them, one page after the other.
+        items: Their items, one page after another.
     """
 
-    moment: Any
+    time: Any
     pages: NDArray[np.int64]
     counts: NDArray[np.int64]
     items: NDArray[np.void]
@@ -61,52 +61,52 @@ class Pages:
     Args:
         canvas: Where they are drawn.
         entity: The pages are entities below this one.
-        columns: Turns items, one after the other, into what Rerun draws.
-        empty: Items, shape (0,) and the type that they all have.
-        style: Returns what all items share, for so many rows. It stands in each row, where it
-            compresses to nearly nothing; a chunk of its own for each page would take more.
+        columns: Turns items into columns for Rerun.
+        dtype: Type of an item.
+        style: Returns the columns of a style for a number of rows. They compress to nearly nothing;
+            a static chunk for each page would take more.
     """
 
     def __init__(
         self,
         canvas: Canvas,
         entity: str,
-        columns: Builder,
-        empty: Items,
+        columns: Callable[[Items], Any],
+        dtype: np.dtype[np.void],
         style: Callable[[int], Any],
     ) -> None:
         self._canvas, self._entity, self._columns, self._style = canvas, entity, columns, style
-        self._items, self._count, self._size = empty, 0, _FIRST_SIZE
+        self._items, self._count, self._size = np.zeros(0, dtype), 0, _FIRST_SIZE
         self._dirty = np.zeros(_MOST_PAGES, np.bool_)
         self._sent = time.monotonic()
-        self._rows: list[_Rows] = []
+        self._rows: list[_PageRows] = []
         self._changes, self._wait = 0, 1
         self._latest: Any = None
 
-    def fill(self, items: Items, moment: Any) -> None:
-        """Take over what was drawn elsewhere before."""
+    def fill(self, items: Items, when: Any) -> None:
+        """Take over items that were drawn elsewhere up to a time."""
         self._put(np.arange(len(items)), items)
-        self._latest = moment
+        self._latest = when
         self._log()
         self._wait = 1
 
     def change(self, rows: Table, slots: NDArray[Any], items: Items) -> None:
-        """Take in changes in their order.
+        """Change items, in the order of the events.
 
         Args:
-            rows: When they happened, shape (n,).
-            slots: What changed, shape (n,); new slots are numbered on.
-            items: To what, shape (n,).
+            rows: The events, shape (n,).
+            slots: Which item each changes, shape (n,); new slots follow the last one.
+            items: The new items, shape (n,).
         """
         iterations, begin = rows["iteration"], 0
         while begin < len(rows):
             end = min(begin + self._wait, len(rows))
-            # What belongs to one iteration appears at once, as the timeline has it.
+            # Changes of one iteration appear at once, as on its timeline.
             end = int(np.searchsorted(iterations, iterations[end - 1], "right"))
             self._put(slots[begin:end], items[begin:end])
             self._wait -= end - begin
             self._changes += end - begin
-            self._latest = moments(rows[end - 1 : end])[0]
+            self._latest = times_of(rows[end - 1 : end])[0]
             if self._wait <= 0:
                 self._log()
             begin = end
@@ -114,7 +114,7 @@ class Pages:
             self._send()
 
     def close(self) -> None:
-        """Log what is not logged yet."""
+        """Log and send the rest."""
         if self._dirty.any() and self._latest is not None:
             self._log()
         self._send()
@@ -124,21 +124,21 @@ class Pages:
         if need > len(self._items):
             more = np.zeros(max(need, 2 * len(self._items)) - len(self._items), self._items.dtype)
             self._items = np.concatenate([self._items, more])
-        self._items[slots] = items  # of several changes of one slot the last one stays
+        self._items[slots] = items  # the last of several changes of a slot stays
         self._count = need
         if need > _MOST_PAGES * self._size:
             while need > _MOST_PAGES * self._size:
                 self._size *= 2
-            self._dirty[:] = True  # those at the end are empty from now on
+            self._dirty[:] = True  # the last pages are empty from now on
         self._dirty[slots // self._size] = True
 
     def _log(self) -> None:
-        """Take a row of each page that changed."""
+        """Add a row of each page that changed."""
         pages = np.flatnonzero(self._dirty)
         counts = (self._count - pages * self._size).clip(0, self._size)
-        items = self._items.view(f"V{self._items.itemsize}")  # fields would make it slow
+        items = self._items.view(f"V{self._items.itemsize}")  # copying field by field is slow
         content = items[_spans(pages * self._size, counts)]
-        self._rows.append(_Rows(self._latest, pages, counts, content))
+        self._rows.append(_PageRows(self._latest, pages, counts, content))
         self._dirty[:] = False
         per_change = _PER_CHANGE if self._changes < _MANY_CHANGES else _PER_CHANGE_OF_MANY
         self._wait = max(1, len(content) // per_change, self._changes // _MOST_UNSEEN)
@@ -150,7 +150,7 @@ class Pages:
                 for parts in zip(*[(r.pages, r.counts, r.items) for r in self._rows], strict=True)
             )
             times = np.repeat(
-                np.array([r.moment for r in self._rows], MOMENT), [len(r.pages) for r in self._rows]
+                np.array([r.time for r in self._rows], TIMES), [len(r.pages) for r in self._rows]
             )
             order, begins = np.argsort(pages, kind="stable"), np.cumsum(counts) - counts
             for mine in np.split(order, np.flatnonzero(np.diff(pages[order])) + 1):
@@ -167,6 +167,6 @@ class Pages:
 
 
 def _spans(begins: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the numbers of spans, so many from each beginning, one span after the other."""
+    """Return the integers of spans, `counts` from each of `begins` on, one span after another."""
     ends = np.cumsum(counts)
     return np.arange(counts.sum()) + np.repeat(begins - ends + counts, counts)

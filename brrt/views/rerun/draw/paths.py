@@ -1,4 +1,4 @@
-"""Paths: each that the planner found, each that shortcuts led to, and the body along the last."""
+"""Paths that the planner found or shortened, moves of the robot, and its body along both."""
 
 from typing import Any
 
@@ -7,22 +7,36 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Stage, Table
-from brrt.views.rerun import layout
-from brrt.views.rerun.draw.canvas import Canvas, moments
+from brrt.scenario.contracts import contract_of
+from brrt.scenario.manifest import Manifest
+from brrt.views.colours import GHOST, ROBOT, TRACE, TRACE_ON_CELLS, path_style
+from brrt.views.rerun.draw.canvas import Canvas, growing_rows, times_of
+from brrt.views.rerun.draw.decimate import Decimation, one_in_stride
+from brrt.views.rerun.layout import (
+    BODY_ENTITY,
+    CELL_ENTITY,
+    GHOSTS_ENTITY,
+    ROBOT_ENTITY,
+    TAIL_ENTITY,
+    TRACE_ENTITY,
+)
 
 _LONGEST_SHOWN = 1000
 """Waypoints up to which a path is drawn anew after each accepted shortcut."""
 
 _LEAST_GAIN = 1e-3
-"""How much shorter an improved path must be than the one in sight to take its place, as a part of
-it; the last one of a batch always does. So there are some hundred of them and a few more."""
+"""How much shorter an improved path must be than the drawn one, as a part of it, to be drawn; the
+last one of a batch always is. So a few hundred paths are drawn at most."""
 
 _GHOSTS, _APART = 24, 0.07
-"""Places along a path at which the body is shown, at most, and how far it moves between two at
-least, as a part of the world's extent: closer ones are a blot."""
+"""Bodies along a path, at most, and how far the body moves between two at least, as a part of the
+world's extent: closer ones would cover each other."""
+
+_MOVES_IN_3D = (2000, 20**3)
+"""Limits of `Decimation` for moves between cells in 3D, where they would hide the cells."""
 
 
-class Paths:
+class PathsDrawing:
     """Draws paths and plots their costs.
 
     Args:
@@ -34,23 +48,21 @@ class Paths:
         self._path: NDArray[np.float64] | None = None
         self._raw_cost = self._shown_cost = np.inf
         for stage in Stage:
-            name, colour, radius = layout.path_style(stage)
+            name, colour, radius = path_style(stage)
             canvas.style(f"/world/path/{name}", canvas.lines, colour, -radius, 40.0 + stage)
-        gold = layout.path_style(Stage.SMOOTHED)[1]
-        canvas.plot_style("/series/cost", "cost", gold)
-        canvas.plot_dots("/series/cost", "cost", gold)
-        canvas.style(layout.GHOSTS_ENTITY, rr.LineStrips2D, layout.GHOST, -0.75, 35.0)
+        canvas.plot_style("/series/cost", "cost", path_style(Stage.SMOOTHED)[1], dots=True)
+        canvas.style(GHOSTS_ENTITY, rr.LineStrips2D, GHOST, -0.75, 35.0)
 
     def write(self, events: Events) -> None:
-        """Draw each path, and those between them as shortcuts are accepted."""
-        changes = self._changes(events)
+        """Draw each path, and the path after each accepted shortcut."""
+        changes = _changes(events)
         drawn: dict[Stage, list[tuple[Any, NDArray[np.float32]]]] = {}
         for number, (event, stage) in enumerate(changes):
             if stage is not None:
                 self._path = event["waypoints"]
-                if not self._worth_it(event, stage, last=number == len(changes) - 1):
+                if not self._gains(event, stage, last=number == len(changes) - 1):
                     continue
-                self._canvas.tell(event, self._text(event, stage))
+                self._canvas.add_text(event, self._text(event, stage))
                 self._draw_ghosts(event)
             elif self._path is not None:
                 self._path = np.delete(self._path, slice(event["i"] + 1, event["j"]), axis=0)
@@ -60,23 +72,14 @@ class Paths:
         for stage, items in drawn.items():
             places = [place for _, place in items]
             strips = self._canvas.strips(np.concatenate(places), [len(place) for place in places])
-            rows, entity = moments(event for event, _ in items), layout.path_style(stage)[0]
-            ones = np.ones(len(rows), np.int64)
-            self._canvas.send_rows(f"/world/path/{entity}", rows, ones, strips)
+            rows, ones = times_of(event for event, _ in items), np.ones(len(items), np.int64)
+            self._canvas.send_rows(f"/world/path/{path_style(stage)[0]}", rows, ones, strips)
         if changes:
             costs = [float(event["cost"]) for event, _ in changes]
-            self._canvas.plot("/series/cost", moments(event for event, _ in changes), costs)
+            self._canvas.plot("/series/cost", times_of(event for event, _ in changes), costs)
 
-    def _changes(self, events: Events) -> list[tuple[Any, Stage | None]]:
-        """Return what changes the path, in order; shortcuts have no stage."""
-        paths, shortcuts = events[Kind.PATH], events[Kind.SHORTCUT]
-        changes: list[tuple[Any, Stage | None]]
-        changes = [(event, Stage(int(event["stage"]))) for event in paths]
-        changes += [(event, None) for event in shortcuts[shortcuts["accepted"]]]
-        changes.sort(key=lambda change: int(change[0]["seq"]))
-        return changes
-
-    def _worth_it(self, event: Any, stage: Stage, *, last: bool) -> bool:
+    def _gains(self, event: Any, stage: Stage, *, last: bool) -> bool:
+        """Return whether a path is enough shorter than the drawn one to be drawn."""
         cost = float(event["cost"])
         if stage is Stage.IMPROVED and not last and cost > (1 - _LEAST_GAIN) * self._shown_cost:
             return False
@@ -93,17 +96,87 @@ class Paths:
         return text
 
     def _draw_ghosts(self, event: Any) -> None:
-        """Show the body along a path, evenly by the robot's metric."""
+        """Draw the body along a path, at even distances in the robot's metric."""
         path, robot = event["waypoints"], self._canvas.robot
         if not robot.outline(path[0]):
             return
         steps = float(event["cost"]) / (_APART * self._canvas.world.extent)
-        bodies = list(robot.along(path, int(np.clip(steps + 1, 2, _GHOSTS))))
-        draw_bodies(self._canvas, layout.GHOSTS_ENTITY, moments([event]), [bodies])
+        poses = list(robot.along(path, int(np.clip(steps + 1, 2, _GHOSTS))))
+        draw_bodies(self._canvas, GHOSTS_ENTITY, times_of([event]), [poses])
+
+
+def _changes(events: Events) -> list[tuple[Any, Stage | None]]:
+    """Return the events that change the path, in order, with their stage; shortcuts have none."""
+    paths, shortcuts = events[Kind.PATH], events[Kind.SHORTCUT]
+    changes: list[tuple[Any, Stage | None]]
+    changes = [(event, Stage(int(event["stage"]))) for event in paths]
+    changes += [(event, None) for event in shortcuts[shortcuts["accepted"]]]
+    changes.sort(key=lambda change: int(change[0]["seq"]))
+    return changes
+
+
+class MovesDrawing:
+    """Draws the moves of the robot: where it is, and its trace.
+
+    Args:
+        canvas: Where they are drawn.
+        manifest: The run's.
+    """
+
+    def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
+        self._canvas = canvas
+        self._edge = edge = contract_of(manifest, canvas.world).epsilon
+        limits = _MOVES_IN_3D if edge and canvas.dim > 2 else ()
+        self._decimation = Decimation(canvas.world, *limits)
+        self._start = canvas.places([manifest.start])
+        self._at, self._drawn = self._start, 0
+        colour = TRACE_ON_CELLS[canvas.dim] if edge else TRACE
+        canvas.style(TRACE_ENTITY, canvas.lines, colour, -0.4 if edge else -0.5, 28.0)
+        canvas.style(ROBOT_ENTITY, canvas.points, ROBOT, -5, 60.0)
+        if canvas.dim == 2:
+            canvas.style(BODY_ENTITY, canvas.lines, ROBOT, -1.5, 55.0)
+        if edge:
+            canvas.style(TAIL_ENTITY, canvas.points, ROBOT, -1.25, 30.0)
+            canvas.style(CELL_ENTITY, canvas.boxes, ROBOT, -1, 58.0)
+
+    def write(self, events: Events) -> None:
+        """Draw the moves of a batch."""
+        table = events[Kind.MOVE]
+        if not len(table):
+            return
+        before = self._decimation.count
+        places = self._draw_trace(table)
+        shown = np.union1d(one_in_stride(before, len(table)), [len(table) - 1])
+        rows, ones = table[shown], np.ones(len(shown), np.int64)
+        points = self._canvas.points.columns(positions=places[shown])
+        self._canvas.send_rows(ROBOT_ENTITY, rows, ones, points)
+        if self._edge:
+            self._canvas.send_rows(TAIL_ENTITY, rows, ones, points)
+            half = np.full((len(rows), self._canvas.dim), self._edge / 2, np.float32)
+            cells = self._canvas.boxes.columns(centers=places[shown], half_sizes=half)
+            self._canvas.send_rows(CELL_ENTITY, rows, ones, cells)
+        if self._canvas.robot.outline(table["q"][0]):
+            draw_bodies(self._canvas, BODY_ENTITY, rows, [[q] for q in rows["q"]])
+
+    def _draw_trace(self, table: Table) -> NDArray[np.float32]:
+        """Draw where the robot has been; return the place after each move, shape (n, dim)."""
+        places = self._canvas.places(table["q"])
+        froms = np.concatenate([self._at, places[:-1]])
+        froms[table["step"] == 1] = self._start  # each trial begins there
+        self._at = places[-1:]
+        kept = self._decimation.keep(places)
+        if self._decimation.began_within(len(table)):
+            text = f"moves: beyond {self._decimation.full:,} only those to new places are drawn"
+            self._canvas.add_text(table[-1], text)
+        if kept.any():
+            rows, lines = table[kept], self._canvas.segments(froms[kept], places[kept])
+            self._canvas.send(TRACE_ENTITY, rows, growing_rows(self._drawn, len(rows)), lines)
+            self._drawn += len(rows)
+        return places
 
 
 def draw_bodies(canvas: Canvas, entity: str, rows: Table, poses: list[Any]) -> None:
-    """Draw the body at one configuration or more at each moment."""
+    """Draw the body at one configuration or more, a list of them a row."""
     strips, counts = list[NDArray[np.float32]](), []
     for row in poses:
         parts = [part for q in row for part in canvas.robot.outline(q)]

@@ -1,4 +1,4 @@
-"""What the last messages say at any instant, against looking at every item."""
+"""The last messages at any instant, against a loop over all items."""
 
 from collections import Counter
 from itertools import chain
@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrt.views.foxglove.interval_topics import tell, topics
+from brrt.views.foxglove.interval_topics import interval_messages, topics
 
 
 @st.composite
@@ -21,32 +21,32 @@ def lives(draw: st.DrawFn) -> tuple[int, list[tuple[int, int]], int]:
 
 @given(lives())
 def test_last_messages_hold_what_is_there(drawn: tuple[int, list[tuple[int, int]], int]) -> None:
-    """At each instant the last message of each topic together hold each living item, once."""
+    """At each instant the last messages of all topics have each existing item once."""
     instants, items, batch = drawn
     born, gone = np.array(items, np.int64).reshape(-1, 2).T
-    told = list(tell(born, gone, instants, batch))
-    assert [t[:2] for t in told] == sorted({t[:2] for t in told})
+    sent = list(interval_messages(born, gone, instants, batch))
+    assert [t[:2] for t in sent] == sorted({t[:2] for t in sent})
     last: dict[int, list[int]] = {}
     for instant in range(instants):
-        while told and told[0].instant == instant:
-            message = told.pop(0)
+        while sent and sent[0].instant == instant:
+            message = sent.pop(0)
             assert 0 <= message.topic < topics(instants, batch)
-            # Nothing is told twice on end, and nothing is taken back that was not told.
+            # No message repeats the one before it on its topic.
             assert message.items.tolist() != last.get(message.topic, [])
             last[message.topic] = message.items.tolist()
         there = [i for i, (b, g) in enumerate(items) if b <= instant < g]
         assert sorted(chain.from_iterable(last.values())) == there
-        assert all(told == sorted(told) for told in last.values())
-    assert not told
+        assert all(sent == sorted(sent) for sent in last.values())
+    assert not sent
 
 
 @given(lives())
-def test_each_item_is_told_rarely(drawn: tuple[int, list[tuple[int, int]], int]) -> None:
-    """An item that stays is told once a size at most, one that goes twice."""
+def test_each_item_is_sent_rarely(drawn: tuple[int, list[tuple[int, int]], int]) -> None:
+    """An item that stays is sent at most once a size, one that goes at most twice."""
     instants, items, batch = drawn
     born, gone = np.array(items, np.int64).reshape(-1, 2).T
     count: Counter[tuple[int, int]] = Counter()
-    for message in tell(born, gone, instants, batch):
+    for message in interval_messages(born, gone, instants, batch):
         if message.topic:
             count.update((message.topic, item) for item in message.items.tolist())
     for (_, item), times in count.items():

@@ -1,86 +1,62 @@
-"""What a picture shows of a run after any of its events: folded once, then cut by number."""
+"""The state of a run after any of its events: the log is folded once, then cut by number."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import LogError
-from brrt.events import Events, Instant, Kind, Phase, Stage, Status
+from brrt.events import Instant, Kind, Phase, Stage, Status
+from brrt.recording import Recording
 from brrt.replay.forest import forest
 from brrt.replay.tree_fold import TreeChanges, of_tree
 from brrt.scenario.contracts import contract_of
-from brrt.scenario.manifest import Manifest
-from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Record:
-    """A run with its events, in memory.
-
-    Attributes:
-        name: What a legend calls it.
-        manifest: The run's.
-        world: Where it took place.
-        events: From the first one on.
-    """
-
-    name: str
-    manifest: Manifest
-    world: World
-    events: Events
-
-    @property
-    def improves(self) -> bool:
-        """Whether the planner found better paths after its first."""
-        return bool((self.events[Kind.PATH]["stage"] == Stage.IMPROVED).any())
-
-
-class Edges(NamedTuple):
+class TreeEdges(NamedTuple):
     """Edges of a tree.
 
     Attributes:
-        ends: Where they begin, at the parent, and end, shape (m, 2, dim).
-        rewired: Whether the node has got a new parent since it joined, shape (m,).
+        ends: Places of the parent and the node, shape (m, 2, dim).
+        rewired: Whether the node has got a new parent since it was added, shape (m,).
     """
 
     ends: Floats
     rewired: NDArray[np.bool_]
 
 
-class Paths(NamedTuple):
-    """Paths as they stand at an instant.
+class CurrentPaths(NamedTuple):
+    """Paths after an event, each with its cost.
 
     Attributes:
-        raw: The best one that the planner has found, and its cost.
-        short: What shortcuts have made of it so far, and its cost.
+        raw: The best path of the planner so far.
+        short: The same after the shortcuts so far.
     """
 
     raw: tuple[Floats, float] | None
     short: tuple[Floats, float] | None
 
 
-class History:
-    """The trees, cells, moves and paths of a run, at any of its events.
+class Playback:
+    """The trees, cells, moves and paths of a run, after any of its events.
 
     Args:
-        record: The run.
+        recording: The run.
 
     Raises:
-        LogError: The events do not make trees.
+        LogError: The events contradict each other.
     """
 
-    def __init__(self, record: Record) -> None:
-        self._events, self._manifest = record.events, record.manifest
-        self.robot = record.manifest.make_robot().resolved(record.world)
-        self.contract = contract_of(record.manifest, record.world)
+    def __init__(self, recording: Recording) -> None:
+        self._events, self._manifest = recording.events(), recording.manifest
+        self.robot = recording.robot()
+        self.contract = contract_of(self._manifest, recording.world)
         self._places: dict[int, Floats] = {}
         self._changes: dict[int, TreeChanges] = {}
-        for number, tree in forest(record.events, self.robot.distance).items():
-            edges, rewires = (record.events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
+        for number, tree in forest(self._events, self.robot.distance).items():
+            edges, rewires = (self._events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
             made = TreeChanges.of(of_tree(edges, number), of_tree(rewires, number))
             _check_parents(made, len(tree))
             self._places[number] = self.robot.places(tree.q)
@@ -94,52 +70,52 @@ class History:
 
     @property
     def has_cells(self) -> bool:
-        """Whether the planner searched a lattice."""
+        """Whether the planner expands cells of a lattice."""
         return len(self._cells) > 0
 
     @property
     def learns(self) -> bool:
-        """Whether the cells have estimates of the cost-to-go, and not costs from the start."""
+        """Whether cells have estimates of the cost-to-go instead of costs from the start."""
         return self.contract.learns
 
     @property
     def last(self) -> int:
-        """Number of the last event; -1 where there is none."""
+        """Number of the last event; -1 if there is none."""
         return max((int(t["seq"][-1]) for t in self._events.tables.values() if len(t)), default=-1)
 
     @property
     def planned(self) -> int:
-        """Number of the event that ended planning, or of the last one."""
+        """Number of the event that ends planning, or of the last one."""
         phases = self._events[Kind.PHASE]
         ended = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)]
         return int(ended["seq"][0]) if len(ended) else self.last
 
     def instant(self, seq: int) -> Instant:
-        """When an event happened."""
+        """Return the time and iteration of an event."""
         return self._events.until(seq=seq).last
 
     def nodes(self, seq: int) -> int:
-        """Count the nodes of all trees, or the expanded cells, after an event."""
+        """Return the number of nodes of all trees, or of expanded cells, after an event."""
         if self.has_cells:
             return int(np.searchsorted(self._cells["seq"], seq, side="right"))
         edges = self._events[Kind.EDGE]["seq"]
         return int(np.searchsorted(edges, seq, side="right"))
 
-    def edges(self, number: int, seq: int) -> Edges:
-        """Return a tree's edges as they are after an event."""
+    def edges(self, number: int, seq: int) -> TreeEdges:
+        """Return the edges of a tree after an event."""
         made, places = self._changes[number], self._places[number]
         upto = int(np.searchsorted(made.seq, seq, side="right"))
         node, joins = made.node[:upto], made.joins[:upto]
         parent = np.full(len(places), -1, np.int64)
-        parent[node] = made.parent[:upto]  # of several changes to a node, the last one stays
+        parent[node] = made.parent[:upto]  # the last of several changes of a node stays
         rewired = np.zeros(len(places), np.bool_)
         rewired[node[~joins]] = True
         child = np.flatnonzero(parent >= 0)
         ends = np.stack([places[parent[child]], places[child]], axis=1)
-        return Edges(ends, rewired[child])
+        return TreeEdges(ends, rewired[child])
 
     def cells(self, seq: int) -> tuple[Floats, Floats]:
-        """Return where the expanded cells are, shape (n, dim), and their values, shape (n,)."""
+        """Return the places of expanded cells, shape (n, dim), and their values, shape (n,)."""
         known = self._cells[: np.searchsorted(self._cells["seq"], seq, side="right")]
         values = self._values[: np.searchsorted(self._values["seq"], seq, side="right")]
         if not len(known):
@@ -150,7 +126,7 @@ class History:
         return self.robot.places(known["q"]), latest
 
     def trace(self, seq: int) -> list[Floats]:
-        """Return the way of each trial's moves, shape (m, dim) each."""
+        """Return the places of the robot in each trial, shape (m, dim)."""
         moves = self._events[Kind.MOVE]
         moves = moves[: np.searchsorted(moves["seq"], seq, side="right")]
         start = self.robot.places(np.array([self._manifest.start]))
@@ -158,7 +134,7 @@ class History:
         return [np.concatenate([start, way]) for way in ways if len(way)]
 
     def rejects(self, seq: int, newest: int) -> Floats:
-        """Return from where to where the newest extensions were tried in vain, (n, 2, dim)."""
+        """Return begin and end of the newest rejected extensions, shape (n, 2, dim)."""
         table = self._events[Kind.REJECT]
         end = int(np.searchsorted(table["seq"], seq, side="right"))
         rows = table[max(0, end - newest) : end]
@@ -170,35 +146,35 @@ class History:
             order = np.argsort(self._cells["cell"])
             cells = self._cells[order]
             at = np.minimum(np.searchsorted(cells["cell"], rows["node"]), len(cells) - 1)
-            there = cells["cell"][at] == rows["node"]
-            ends[there, 0] = self.robot.places(cells["q"][at[there]])
+            known = cells["cell"][at] == rows["node"]
+            ends[known, 0] = self.robot.places(cells["q"][at[known]])
         ends[:, 1] = self.robot.places(rows["q"])
         return np.asarray(ends[~np.isnan(ends).any(axis=(1, 2))])
 
-    def paths(self, seq: int) -> Paths:
-        """Return the paths as they stand after an event."""
+    def paths(self, seq: int) -> CurrentPaths:
+        """Return the paths after an event."""
         part = self._events.until(seq=seq)
         found = [(Stage(int(row["stage"])), row) for row in part[Kind.PATH]]
         raw = next((row for stage, row in reversed(found) if stage is not Stage.SMOOTHED), None)
         if raw is None:
-            return Paths(None, None)
+            return CurrentPaths(None, None)
         stage, last = found[-1]
         best = np.asarray(raw["waypoints"]), float(raw["cost"])
         if stage is Stage.SMOOTHED:
-            return Paths(best, (np.asarray(last["waypoints"]), float(last["cost"])))
+            return CurrentPaths(best, (np.asarray(last["waypoints"]), float(last["cost"])))
         cuts = part[Kind.SHORTCUT]
         cuts = cuts[(cuts["seq"] > raw["seq"]) & cuts["accepted"]]
         if not len(cuts):
-            return Paths(best, None)
+            return CurrentPaths(best, None)
         short = best[0]
         for cut in cuts:
             short = np.delete(short, slice(int(cut["i"]) + 1, int(cut["j"])), axis=0)
-        return Paths(best, (short, float(cuts[-1]["cost"])))
+        return CurrentPaths(best, (short, float(cuts[-1]["cost"])))
 
     def _estimates(self) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        """Return cells as they are first expanded, and every value that one gets, in order.
+        """Return the first expansion of each cell, and all values that cells get, in order.
 
-        An estimate that was not raised yet is the distance to the goal.
+        The first estimate of the cost-to-go is the distance to the goal.
         """
         expands, raised = self._events[Kind.EXPAND], self._events[Kind.HEURISTIC]
         first = expands[np.sort(np.unique(expands["cell"], return_index=True)[1])]
@@ -206,8 +182,8 @@ class History:
         raised = raised[np.isin(raised["cell"], first["cell"])]
         goal = np.array(self._manifest.goal)
         own = self.robot.distance(seen["q"], goal) if self.learns else seen["cost"]
-        layout = [("seq", "<i8"), ("cell", "<i4"), ("value", "<f8")]
-        values = np.zeros(len(seen) + len(raised), layout)
+        dtype = [("seq", "<i8"), ("cell", "<i4"), ("value", "<f8")]
+        values = np.zeros(len(seen) + len(raised), dtype)
         for name in ("seq", "cell"):
             values[name] = np.concatenate([seen[name], raised[name]])
         values["value"] = np.concatenate([own, raised["h"]])
@@ -220,5 +196,5 @@ def _check_parents(made: TreeChanges, nodes: int) -> None:
         i = int(wrong[0])
         raise LogError(
             f"event {made.seq[i]}: node {made.node[i]} gets parent {made.parent[i]}, "
-            "which is not there"
+            "which does not exist"
         )

@@ -27,13 +27,14 @@ from brrt import (
     read,
 )
 from brrt.events import Stage
-from brrt.views import foxglove
+from brrt.views.colours import heat, tree_style
+from brrt.views.foxglove import export as module
 from brrt.views.foxglove import interval_topics
-from brrt.views.rerun import layout
+from brrt.views.foxglove.export import export
 from brrt.worlds.free_space import occupied
-from tests.conftest import Result, recorded
+from tests.conftest import recorded
+from tests.support.recordings import RECORDINGS
 
-GOLDENS = Path(__file__).parents[2] / "recordings"
 TREES = (
     "boxes3d-bi-rrt-star", "circles2d-rrt-star", "circles2d-chain", "polygons2d-polygon",
     "spheres3d-unsolved", "squares2d-bi-rrt-coin", "circles2d-rrt-connect",
@@ -79,8 +80,8 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Shown]:
     def get(name: str) -> Shown:
         if name not in done:
             path = tmp_path_factory.mktemp("export") / "viz.mcap"
-            recording = read(GOLDENS / f"{name}.mcap")
-            foxglove.export(recording, path)
+            recording = read(RECORDINGS / f"{name}.mcap")
+            export(recording, path)
             done[name] = load(path, recording)
         return done[name]
 
@@ -127,26 +128,26 @@ def lines(froms: Any, tos: Any) -> Counter[tuple[tuple[float, ...], ...]]:
 @pytest.mark.parametrize("name", TREES)
 def test_a_seek_shows_the_forest(name: str, shown: Callable[[str], Shown]) -> None:
     """At any time, the edges that are drawn are those of the forest then, rewired ones too."""
-    export = shown(name)
-    log, robot = export.recording.events(), export.recording.manifest.make_robot()
+    given = shown(name)
+    log, robot = given.recording.events(), given.recording.manifest.make_robot()
     for t in times(log):
         for number, tree in forest(log.until(t=t)).items():
             places = robot.places(tree.q)
             child = np.flatnonzero(tree.parent >= 0)
-            drawn = export.at(t, f"/viz/tree/{layout.tree_style(number)[0]}/")
+            drawn = given.at(t, f"/viz/tree/{tree_style(number)[0]}/")
             assert segments(drawn) == lines(places[tree.parent[child]], places[child]), t
-    assert not export.at(-1, "/viz/")
+    assert not given.at(-1, "/viz/")
 
 
 @pytest.mark.parametrize("name", [*TREES, *SEARCHES])
 def test_a_seek_shows_the_paths(name: str, shown: Callable[[str], Shown]) -> None:
     """At any time, the newest path of each stage is drawn, and nothing of one to come."""
-    export = shown(name)
-    log, robot = export.recording.events(), export.recording.manifest.make_robot()
+    given = shown(name)
+    log, robot = given.recording.events(), given.recording.manifest.make_robot()
     for t in [*times(log), *log[Kind.PATH]["t"].tolist()]:
         for stage in Stage:
             past = [row for row in log[Kind.PATH] if row["t"] <= t and row["stage"] == stage]
-            drawn = segments(export.at(t, f"/viz/path/{stage.key}"))
+            drawn = segments(given.at(t, f"/viz/path/{stage.name.lower()}"))
             places = robot.places(past[-1]["waypoints"]) if past else np.empty((0, 2))
             want = lines(places[:-1], places[1:])
             assert [end[:2] for pair in drawn for end in pair] == [
@@ -156,20 +157,20 @@ def test_a_seek_shows_the_paths(name: str, shown: Callable[[str], Shown]) -> Non
 
 def test_links_between_trees(shown: Callable[[str], Shown]) -> None:
     """Every link up to a time is drawn."""
-    export = shown("boxes3d-bi-rrt-star")
-    log = export.recording.events()
+    given = shown("boxes3d-bi-rrt-star")
+    log = given.recording.events()
     trees = forest(log)
     for t in times(log)[:50]:
         past = log.until(t=t)[Kind.CONNECT]
         ends = trees[0].q[past["node"]], trees[1].q[past["other"]]
-        assert segments(export.at(t, "/viz/link/")) == lines(*ends)
+        assert segments(given.at(t, "/viz/link/")) == lines(*ends)
 
 
 @pytest.mark.parametrize("name", SEARCHES)
 def test_a_seek_shows_the_cells(name: str, shown: Callable[[str], Shown]) -> None:
     """At any time, each cell seen is drawn once, in the colour of what is known of it then."""
-    export = shown(name)
-    recording = export.recording
+    given = shown(name)
+    recording = given.recording
     log, robot = recording.events(), recording.manifest.make_robot()
     start, goal = np.array(recording.manifest.start), np.array(recording.manifest.goal)
     scale = float(robot.distance(start, goal))
@@ -189,16 +190,16 @@ def test_a_seek_shows_the_cells(name: str, shown: Callable[[str], Shown]) -> Non
                 known = float(robot.distance(row["q"], goal)) if known is None else known
                 cells[int(row["cell"])] = row["q"], float(known)
         values = np.array([value for _, value in cells.values()])
-        packed = layout.heat(values / (values + scale)).tolist()
+        colours = heat(values / (values + scale)).tolist()
         want = Counter(
             (
                 *np.float32(q).astype(float).tolist(),
-                *((c >> shift & 255) for shift in (24, 16, 8)),
+                *colour,
             )
-            for (q, _), c in zip(cells.values(), packed, strict=True)
+            for (q, _), colour in zip(cells.values(), colours, strict=True)
         )
         got: Counter[tuple[float, ...]] = Counter()
-        for marker in export.at(t, "/viz/cells/"):
+        for marker in given.at(t, "/viz/cells/"):
             for place, c in zip(points(marker), marker.colors, strict=True):
                 colour = tuple(round(255 * part) for part in (c.r, c.g, c.b))
                 got[(*place[: log.dof], *colour)] += 1
@@ -207,19 +208,19 @@ def test_a_seek_shows_the_cells(name: str, shown: Callable[[str], Shown]) -> Non
 
 def test_a_seek_shows_the_robot_and_its_trace(shown: Callable[[str], Shown]) -> None:
     """At any time the robot is where its newest move went, at the end of its way of each trial."""
-    export = shown("boxes3d-lrta-star")
-    log = export.recording.events()
+    given = shown("boxes3d-lrta-star")
+    log = given.recording.events()
     for t in times(log)[:100]:
-        at, froms, tos = np.array(export.recording.manifest.start), [], []
+        at, froms, tos = np.array(given.recording.manifest.start), [], []
         for row in log.until(t=t)[Kind.MOVE]:
-            at = np.array(export.recording.manifest.start) if row["step"] == 1 else at
+            at = np.array(given.recording.manifest.start) if row["step"] == 1 else at
             if (at != row["q"]).any():
                 froms.append(at)
                 tos.append(row["q"])
             at = row["q"]
         want = lines(np.reshape(froms, (-1, 3)), np.reshape(tos, (-1, 3)))
-        assert segments(export.at(t, "/viz/trace/")) == want
-        robot = [marker.pose.position for marker in export.at(t, "/viz/robot")]
+        assert segments(given.at(t, "/viz/trace/")) == want
+        robot = [marker.pose.position for marker in given.at(t, "/viz/robot")]
         if len(log.until(t=t)[Kind.MOVE]):
             assert [[p.x, p.y, p.z] for p in robot] == [np.float32(at).astype(float).tolist()]
         else:
@@ -229,11 +230,11 @@ def test_a_seek_shows_the_robot_and_its_trace(shown: Callable[[str], Shown]) -> 
 @pytest.mark.parametrize("name", ["circles2d-chain", "polygons2d-polygon"])
 def test_bodies(name: str, shown: Callable[[str], Shown]) -> None:
     """The body stands at start and goal, and at a node that is at most a batch old."""
-    export = shown(name)
-    manifest = export.recording.manifest
-    log, robot = export.recording.events(), manifest.make_robot()
+    given = shown(name)
+    manifest = given.recording.manifest
+    log, robot = given.recording.events(), manifest.make_robot()
     for topic, q in (("/viz/start", manifest.start), ("/viz/goal", manifest.goal)):
-        (message,) = export.at(0, topic)
+        (message,) = given.at(0, topic)
         corners = {p[:2] for marker in message.markers for p in points(marker)}
         assert corners == {tuple(v) for part in robot.outline(np.array(q)) for v in part.tolist()}
     for t in times(log):
@@ -244,7 +245,7 @@ def test_bodies(name: str, shown: Callable[[str], Shown]) -> None:
                 {tuple(v) for part in robot.outline(q) for v in part.tolist()}
                 for q in mine[-interval_topics.BATCH :]
             ]
-            drawn = export.at(t, f"/viz/body/{layout.tree_style(number)[0]}")
+            drawn = given.at(t, f"/viz/body/{tree_style(number)[0]}")
             assert [{p[:2] for p in points(marker)} in fresh for marker in drawn] in ([], [True])
             assert drawn or len(mine) < interval_topics.BATCH
 
@@ -252,9 +253,9 @@ def test_bodies(name: str, shown: Callable[[str], Shown]) -> None:
 @pytest.mark.parametrize("name", [*TREES, *SEARCHES])
 def test_messages_are_what_panels_draw(name: str, shown: Callable[[str], Shown]) -> None:
     """Times rise, lists have whole items, only what is there is taken away; one still frame."""
-    export = shown(name)
-    epoch, end = export.recording.manifest.epoch_ns, export.recording.events().last.t
-    for topic, messages in export.topics.items():
+    given = shown(name)
+    epoch, end = given.recording.manifest.epoch_ns, given.recording.events().last.t
+    for topic, messages in given.topics.items():
         at = [time for time, _ in messages]
         assert at == sorted(set(at))
         assert at[0] >= epoch
@@ -282,7 +283,7 @@ def test_messages_are_what_panels_draw(name: str, shown: Callable[[str], Shown])
 
 def test_streams_declare_channels_before_messages(tmp_path: Path) -> None:
     """A reader that goes from front to end finds each channel before its first message."""
-    foxglove.export(read(GOLDENS / "circles2d-rrt-star.mcap"), tmp_path / "viz.mcap")
+    export(read(RECORDINGS / "circles2d-rrt-star.mcap"), tmp_path / "viz.mcap")
     known, used = set(), set()
     with (tmp_path / "viz.mcap").open("rb") as file:
         for record in StreamReader(file, validate_crcs=True).records:
@@ -305,7 +306,7 @@ def test_size_at_20_000_edges(tmp_path: Path) -> None:
     run, log = recorded(scenario)
     log = log.until(seq=int(log[Kind.EDGE]["seq"][20_000]))
     path = tmp_path / "viz.mcap"
-    foxglove.export(of(run, log), path)
+    export(of(run, log), path)
     assert path.stat().st_size <= 60 * 20_000
     tree = forest(log)[0]
     for t in np.random.default_rng(1).choice(log[Kind.EDGE]["t"], 3).tolist():
@@ -328,9 +329,9 @@ def test_flat_worlds_are_filled(spec: str, tmp_path: Path) -> None:
     """A point is in a triangle, a disc or a blocked cell if and only if it is in an obstacle."""
     run, log = recorded(Scenario(world=spec, iterations=1, smooth=False))
     world = run.problem.world
-    foxglove.export(of(run, log), tmp_path / "viz.mcap")
-    export = load(tmp_path / "viz.mcap", of(run, log))
-    ((message,), maps) = export.at(0, "/viz/world"), export.at(0, "/viz/map")
+    export(of(run, log), tmp_path / "viz.mcap")
+    given = load(tmp_path / "viz.mcap", of(run, log))
+    ((message,), maps) = given.at(0, "/viz/world"), given.at(0, "/viz/map")
     tries = np.random.default_rng(0).uniform(world.lower, world.upper, (2000, 2))
     hit = np.zeros(len(tries), bool)
     for marker in message.markers:
@@ -368,7 +369,7 @@ def test_turned_map(tmp_path: Path) -> None:
     cells = np.random.default_rng(2).random((13, 29)) < 0.3
     world = World.of_grid("turned", Grid(cells, np.array([3.0, -2.0]), 0.5, 0.4))
     recording = replace(of(run, log), world=world)
-    foxglove.export(recording, tmp_path / "viz.mcap", layout_path=tmp_path / "l.json")
+    export(recording, tmp_path / "viz.mcap", layout_path=tmp_path / "l.json")
     (message,) = load(tmp_path / "viz.mcap", recording).at(0, "/viz/map")
     tries = np.random.default_rng(3).uniform(world.lower, world.upper, (1000, 2))
     assert world.grid is not None
@@ -384,7 +385,7 @@ def test_deep_worlds(spec: str, tmp_path: Path) -> None:
     """Each box is a cube and each ball a sphere of its size."""
     run, log = recorded(Scenario(world=spec, iterations=1, smooth=False))
     world = run.problem.world
-    foxglove.export(of(run, log), tmp_path / "viz.mcap")
+    export(of(run, log), tmp_path / "viz.mcap")
     (message,) = load(tmp_path / "viz.mcap", of(run, log)).at(0, "/viz/world")
     got = [
         [m.type, *(getattr(part, axis) for part in (m.pose.position, m.scale) for axis in "xyz")]
@@ -401,7 +402,7 @@ def test_run_without_events(tmp_path: Path) -> None:
     """Of a run that was cut before its first event there is the scene."""
     run, _ = recorded(Scenario(world="circles2d", iterations=1))
     recording = of(run, Events(2, {}))
-    assert foxglove.export(recording, tmp_path / "viz.mcap") == 3
+    assert export(recording, tmp_path / "viz.mcap") == 3
     assert load(tmp_path / "viz.mcap", recording).topics.keys() == {
         "/viz/world", "/viz/start", "/viz/goal",
     }  # fmt: skip
@@ -416,13 +417,13 @@ def test_changes_at_one_instant_appear_at_once(tmp_path: Path) -> None:
     for table in tables.values():
         table["t"] = table["t"] // 200_000 * 200_000
     coarse = Events(log.dof, tables)
-    foxglove.export(of(run, coarse), tmp_path / "viz.mcap")
-    export = load(tmp_path / "viz.mcap", of(run, coarse))
+    export(of(run, coarse), tmp_path / "viz.mcap")
+    given = load(tmp_path / "viz.mcap", of(run, coarse))
     for t in np.unique(coarse[Kind.EDGE]["t"]).tolist():
         tree = forest(coarse.until(t=t))[0]
         child = np.flatnonzero(tree.parent >= 0)
         want = lines(tree.q[tree.parent[child]], tree.q[child])
-        assert segments(export.at(t, "/viz/tree/start/")) == want
+        assert segments(given.at(t, "/viz/tree/start/")) == want
 
 
 def test_failures_leave_no_file(tmp_path: Path) -> None:
@@ -431,66 +432,22 @@ def test_failures_leave_no_file(tmp_path: Path) -> None:
     edges = log[Kind.EDGE].copy()
     edges["parent"][3] = 99
     with pytest.raises(BrrtError, match=r"there is no node 99"):
-        foxglove.export(of(run, Events(2, {Kind.EDGE: edges})), tmp_path / "viz.mcap")
+        export(of(run, Events(2, {Kind.EDGE: edges})), tmp_path / "viz.mcap")
     with pytest.raises(BrrtError, match=r"cannot write .*No such file"):
-        foxglove.export(of(run, log), tmp_path / "nowhere" / "viz.mcap")
+        export(of(run, log), tmp_path / "nowhere" / "viz.mcap")
     with pytest.raises(BrrtError, match=r"cannot write .*No such file"):
-        foxglove.export(
-            of(run, log), tmp_path / "viz.mcap", layout_path=tmp_path / "nowhere" / "l.json"
-        )
+        export(of(run, log), tmp_path / "viz.mcap", layout_path=tmp_path / "nowhere" / "l.json")
     assert not list(tmp_path.iterdir())
 
 
 def test_progress_rises_to_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long work says how far it is, and small chunks show the same."""
-    monkeypatch.setattr(foxglove, "_CHUNK", 10_000)
+    monkeypatch.setattr(module, "_CHUNK", 10_000)
     parts: list[float] = []
-    recording = read(GOLDENS / "circles2d-rrt-star.mcap")
-    foxglove.export(recording, tmp_path / "viz.mcap", progress=parts.append)
+    recording = read(RECORDINGS / "circles2d-rrt-star.mcap")
+    export(recording, tmp_path / "viz.mcap", progress=parts.append)
     assert len(parts) > 5
     assert parts == sorted(parts)
     assert 0 <= parts[0] < 0.5 < parts[-1] <= 1
     small = load(tmp_path / "viz.mcap", recording)
     assert segments(small.at(recording.events().last.t, "/viz/tree/"))
-
-
-def test_command(brrt: Callable[..., Result]) -> None:
-    """The command writes what it says, keeps older files, and its layout shows every topic."""
-    golden = GOLDENS / "boxes3d-bi-rrt-star.mcap"
-    done = brrt("export", golden, "--foxglove", "viz.mcap", "--layout", "l.json")
-    assert (done.code, done.err) == (0, "")
-    assert "513 messages" in done.out
-    export = load(Path("viz.mcap"), read(golden))
-    data = json.loads(Path("l.json").read_text())
-    assert data["layout"] in data["configById"]
-    panel = data["configById"][data["layout"]]
-    assert panel["topics"].keys() == export.topics.keys()
-    assert all(topic["visible"] for topic in panel["topics"].values())
-    assert panel["followTf"] == "world"
-    before = Path("viz.mcap").read_bytes()
-    for args, text in (
-        ((golden, "--foxglove", "viz.mcap"), "exists already"),
-        ((golden, "--foxglove", "x.mcap", "--layout", "l.json"), "exists already"),
-        ((golden, "--foxglove", "x.bag"), "must end in .mcap"),
-        ((golden,), "name a file with --foxglove"),
-        (("viz.mcap", "--foxglove", "viz.mcap", "--force"), "is the recording"),
-        (("viz.mcap", "--foxglove", "x.mcap"), "not a recording of brrt"),
-    ):
-        failed = brrt("export", *args)
-        assert failed.code == 2
-        assert text in failed.err
-        assert failed.err.count("\n") == 1
-    assert Path("viz.mcap").read_bytes() == before
-    assert brrt("export", golden, "--foxglove", "viz.mcap", "--force").code == 0
-
-
-def test_command_takes_what_is_whole(brrt: Callable[..., Result]) -> None:
-    """Of a file that was cut, it exports what is whole if it is told to."""
-    data = (GOLDENS / "circles2d-chain.mcap").read_bytes()
-    Path("cut.mcap").write_bytes(data[: len(data) * 3 // 4])
-    refused = brrt("export", "cut.mcap", "--foxglove", "viz.mcap")
-    assert refused.code == 2
-    assert "export them with --partial" in refused.err
-    assert not Path("viz.mcap").exists()
-    assert brrt("export", "cut.mcap", "--foxglove", "viz.mcap", "--partial").code == 0
-    assert Path("viz.mcap").exists()

@@ -1,0 +1,62 @@
+"""Live runs and worlds share one window."""
+
+import os
+import signal
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from rerun.experimental import ViewerClient
+
+from brrt.views.viewer import process
+from tests.conftest import Result
+from tests.support.web import ports_of
+
+
+@contextmanager
+def window(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Replace the viewer's window by a headless viewer, and end it after the body."""
+    program, began = process.program(), folder / "began"
+    assert program is not None
+    hidden = folder / "hidden"
+    hidden.write_text(
+        f"#!/bin/sh\necho $$ >> {began}\necho noise\n"
+        f'exec {program} --headless --window-size=1000x700 "$@"\n'
+    )
+    hidden.chmod(0o755)
+    monkeypatch.setenv("DISPLAY", ":nowhere")
+    monkeypatch.setattr(process, "PORT", process.free_port())
+    monkeypatch.setattr(process, "program", lambda: str(hidden))
+    try:
+        yield
+    finally:
+        for number in began.read_text().split() if began.exists() else ():
+            os.kill(int(number), signal.SIGTERM)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("viewer")
+def test_runs_share_a_window(
+    brrt: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A world, a run in 2D and one in 3D have their own layouts in one window.
+
+    The window listens on this machine only, and its output is not shown.
+    """
+    psutil = pytest.importorskip("psutil")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with window(tmp_path, monkeypatch):
+        for args in (
+            ["worlds", "show", "circles2d:n=20,seed=2", "--view"],
+            ["plan", "--world", "circles2d:n=20,seed=2", "--no-record", "--view", "--json"],
+            ["plan", "--world", "boxes3d:n=60", "--no-record", "--view", "--json"],
+        ):
+            result = brrt(*args)
+            assert (result.code, "noise" in result.out + result.err) == (0, False), result.err
+        (number,) = (tmp_path / "began").read_text().split()
+        assert set(ports_of(psutil.Process(int(number))).values()) == {"127.0.0.1"}
+        client = ViewerClient.connect(process.address())
+        names = {each.store_id.split(":")[1] for each in client.get_state().recordings}
+        assert names == {"brrt 2d world 100 x 100", "brrt 2d 100 x 100", "brrt 3d 100 x 100 x 100"}
