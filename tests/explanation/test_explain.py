@@ -478,7 +478,7 @@ def test_a_folded_command_is_the_command(values: list[str], flags: int) -> None:
     """A shell reads the lines as the words; each fits a screen if its words do."""
     words = ["brrt", "plan", *(f"--flag{i}" for i in range(flags))]
     words += [part for i, value in enumerate(values) for part in (f"--option{i}", value)]
-    lines = Advice("why", tuple(words)).lines()
+    lines = Advice("why", tuple(words)).command_lines()
     assert shlex.split("\n".join(lines).replace("\\\n", "")) == words
     assert all(len(line) <= 79 for line in lines)
     assert all(line.endswith(" \\") for line in lines[:-1])
