@@ -3,6 +3,7 @@
 import signal
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from urllib.parse import parse_qs, urlparse
 
@@ -15,6 +16,7 @@ from brrt.views.rerun import layout
 from brrt.views.rerun.drawing import draw_into
 from brrt.views.rerun.stream import rrd_file
 from brrt.views.viewer.process import free_port
+from brrt.views.viewer.web import Server
 from tests.conftest import Result
 from tests.support.browser import CHROMIUM, browser
 from tests.support.pixels import frame, near, of_colour, opened
@@ -68,10 +70,10 @@ def test_browser_shows_the_run(tmp_path: Path) -> None:
         draw_into(rec, recording)
     end, last, png = time.monotonic() + 150, b"", b""
     with (
-        served(tmp_path, run) as (_, address),
+        closing(Server(run)) as server,
         browser(tmp_path / "browser", SIZE, 200) as page,
     ):
-        page.visit(address)
+        page.visit(server.address)
         while time.monotonic() < end:
             time.sleep(1)
             last, png = png, page.picture()
