@@ -11,7 +11,7 @@ from brrt.recording import Recording
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contract_of, origins_of, planner_settings
 from brrt.scenario.manifest import Manifest
-from brrt.scenario.scenario import MOST
+from brrt.scenario.scenario import UNLIMITED
 from brrt.worlds.world import World
 
 _PLAIN = ("planner", "seed", "draws", "time", "smooth", "shortcuts", "execute", "max_move",
@@ -46,7 +46,7 @@ def settings_of(a: Recording, b: Recording) -> Iterator[Row]:
         manifest.scenario.iteration_limit(contract.planner.default_iterations)
         for manifest, contract in zip(both, contracts, strict=True)
     )
-    yield from _row("iterations", *("no limit" if n >= MOST else n for n in limits))
+    yield from _row("iterations", *("no limit" if n >= UNLIMITED else n for n in limits))
     yield from _branches(*both)
     robots, worlds = list(differing("robot", _robot(a), _robot(b))), list(_worlds(a.world, b.world))
     settings = planner_settings(both[0])[-1], planner_settings(both[1])[-1]

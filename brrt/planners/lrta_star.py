@@ -8,11 +8,12 @@ import numpy as np
 from brrt.kernels.lattice import empty_search, enlarged_lattice, enlarged_search
 from brrt.planners import _lrta_star
 from brrt.planners.a_star import MOST_DRAWS, LatticePlanner
-from brrt.planners.base.kernel_planner import UNLIMITED, Kernel
+from brrt.planners.base.kernel_planner import Kernel
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario import contract
 from brrt.scenario.query import Query
+from brrt.scenario.scenario import UNLIMITED
 from brrt.settings import param
 
 _MOST_AHEAD = 10_000
@@ -43,13 +44,13 @@ class LRTAStar(LatticePlanner):
         )  # fmt: skip
         return contract.Contract(lattice=grid)
 
-    def retracing(self, problem: Problem) -> Kernel[Any]:
-        """See `KernelPlanner.retracing`."""
+    def open_ended_loop(self, problem: Problem) -> Kernel[Any]:
+        """See `KernelPlanner.open_ended_loop`."""
         loop = self.loop(problem, Stop(iterations=UNLIMITED))
         return replace(loop, options=loop.options._replace(open_ended=True))
 
-    def ends_where(self, other: Self) -> bool:
-        """See `KernelPlanner.ends_where`."""
+    def ends_at_path_of(self, other: Self) -> bool:
+        """See `KernelPlanner.ends_at_path_of`."""
         return self.trials <= other.trials
 
     def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002

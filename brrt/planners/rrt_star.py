@@ -9,12 +9,13 @@ import numpy as np
 from brrt.kernels.arrays import enlarged
 from brrt.kernels.forest import enlarged_forest, rooted_forest
 from brrt.planners import _rrt_star
-from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelPlanner
+from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.planners.bi_rrt import step_length
 from brrt.scenario.contract import Contract, Draws, Growth, Near
 from brrt.scenario.query import Query
+from brrt.scenario.scenario import UNLIMITED
 from brrt.settings import param
 
 DEFAULT_STEP = 0.2
@@ -58,12 +59,12 @@ class StarPlanner(KernelPlanner):
             stops=options.stop_at_first,
         )
 
-    def retracing(self, problem: Problem) -> Kernel[Any]:
-        """See `KernelPlanner.retracing`."""
+    def open_ended_loop(self, problem: Problem) -> Kernel[Any]:
+        """See `KernelPlanner.open_ended_loop`."""
         return replace(self, stop_at_first=False).loop(problem, Stop(iterations=UNLIMITED))
 
-    def ends_where(self, other: Self) -> bool:  # noqa: ARG002
-        """See `KernelPlanner.ends_where`."""
+    def ends_at_path_of(self, other: Self) -> bool:  # noqa: ARG002
+        """See `KernelPlanner.ends_at_path_of`."""
         return self.stop_at_first
 
     def options(self, query: Query) -> _rrt_star.RRTStarOptions:

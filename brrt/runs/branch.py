@@ -175,7 +175,7 @@ def _check_open(
         BrrtError: The run ended with a path and the new settings stop there too, or with the proof
             that there is no path.
     """
-    if ended is Status.SOLVED and now.ends_where(before):
+    if ended is Status.SOLVED and now.ends_at_path_of(before):
         remedy = f", or {now.resume_hint}" if now.resume_hint else ""
         outcome = "its path"
     elif ended is Status.NO_PATH:

@@ -15,13 +15,13 @@ from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.event_log import EventLog
 from brrt.planners import PLANNERS, make_planner
-from brrt.planners.base.kernel_planner import UNLIMITED, Kernel, KernelPlanner, KernelRun
+from brrt.planners.base.kernel_planner import Kernel, KernelPlanner, KernelRun
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.recording import Recording
 from brrt.runs.run import Run, Solver, made_by
 from brrt.scenario.manifest import Manifest
-from brrt.scenario.scenario import Scenario
+from brrt.scenario.scenario import UNLIMITED, Scenario
 
 
 class RecordedRun(Run):
@@ -144,7 +144,7 @@ def _started(
 
 
 def _replan_kernel(scenario: Scenario, problem: Problem) -> Kernel[Any]:
-    return kernel_planner(scenario).retracing(problem)
+    return kernel_planner(scenario).open_ended_loop(problem)
 
 
 def _replan(
@@ -152,9 +152,9 @@ def _replan(
 ) -> Iterator[Events]:
     """Plan to the end of an iteration, with the settings of each stretch of the manifest."""
     for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
-        yield from run.go_on(Stop(iterations=UNLIMITED, draws=branch.iteration))
+        yield from run.run_to(Stop(iterations=UNLIMITED, draws=branch.iteration))
         run.switch_settings(_replan_kernel(after, problem), branch.seed)
-    yield from run.go_on(Stop(iterations=UNLIMITED, draws=iteration))
+    yield from run.run_to(Stop(iterations=UNLIMITED, draws=iteration))
     yield log.drain()
 
 

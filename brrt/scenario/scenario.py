@@ -15,8 +15,8 @@ from brrt.worlds import world_beside
 RANDOM: Literal["random"] = "random"
 """A start or goal that is drawn from the scenario's seed."""
 
-MOST = 10**15
-"""More than any count of a run; fits into 64 bits."""
+UNLIMITED = 10**15
+"""A limit that no count of a run reaches; fits into 64 bits."""
 
 DEFAULT_ITERATIONS = 1_000_000
 """Iterations of a run without a budget, unless its planner has another default."""
@@ -147,12 +147,12 @@ class Scenario:
         return asdict(self)
 
     def iteration_limit(self, default: int = DEFAULT_ITERATIONS) -> int:
-        """Return the limit of the planner's iterations; `MOST` if only its time is limited.
+        """Return the limit of the planner's iterations; `UNLIMITED` if only its time is limited.
 
         Args:
             default: The planner's default, for a run without a budget.
         """
-        usual = MOST if self.time is not None else default
+        usual = UNLIMITED if self.time is not None else default
         return usual if self.iterations is None else self.iterations
 
     def make_robot(self) -> Robot:
@@ -185,8 +185,8 @@ def _whole(name: str, value: Any, *, low: int) -> None:
         raise BrrtError(f"{name} must be a whole number, not {value!r}")
     if value < low:
         raise BrrtError(f"{name} must be at least {low}, not {value}")
-    if name != "seed" and value > MOST:
-        raise BrrtError(f"{name} must be at most {MOST:,}, not {value}")
+    if name != "seed" and value > UNLIMITED:
+        raise BrrtError(f"{name} must be at most {UNLIMITED:,}, not {value}")
 
 
 def _configuration(name: str, value: Any) -> tuple[float, ...] | Literal["random"]:

@@ -19,6 +19,7 @@ from brrt.kernels.random import borrow, give_back
 from brrt.planners.base.planner import Planner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
+from brrt.scenario.scenario import UNLIMITED
 
 BATCH_FULL, STATE_FULL, LIMIT, ENDED = range(4)
 """Why a loop returned: the log is full, its own arrays are full, its iterations or draws are used
@@ -29,9 +30,6 @@ DRAWS, COUNTED, EVENTS, POINTS = range(4)
 the log must have room for before the loop can continue, if that is more than usual."""
 OWN = 4
 """First place of `counts` that a loop may use for itself."""
-
-UNLIMITED = 10**15
-"""More iterations than any run makes."""
 
 State = TypeVar("State", bound=Any)
 
@@ -63,7 +61,7 @@ class KernelRun:
     Args:
         loop: The loop.
         problem: Robot, world, start and goal.
-        rng: Every random draw comes from here.
+        rng: Source of all random draws.
         log: Numbers and times the events.
     """
 
@@ -90,7 +88,7 @@ class KernelRun:
         """Number of draws so far, whether they count or not."""
         return int(self._loop.state.counts[DRAWS])
 
-    def go_on(self, stop: Stop) -> Generator[Events, None, Status | None]:
+    def run_to(self, stop: Stop) -> Generator[Events, None, Status | None]:
         """Yield batches of events up to the end of a budget.
 
         Returns:
@@ -138,7 +136,7 @@ class KernelRun:
 
     def finish(self, stop: Stop) -> Iterator[Events]:
         """Yield batches of events to the end of planning, by the budget or by the planner."""
-        status = yield from self.go_on(stop)
+        status = yield from self.run_to(stop)
         give_back(self._draws, self._rng)
         if status is not None:
             if self._log.room < 1:
@@ -166,14 +164,14 @@ class KernelPlanner(Planner):
             stop: The budget, by which arrays are allocated.
         """
 
-    def retracing(self, problem: Problem) -> Kernel[Any]:
+    def open_ended_loop(self, problem: Problem) -> Kernel[Any]:
         """Make the loop that reproduces the beginning of a run, up to a number of draws.
 
         If a run that ended with a path can continue, it does not emit the end of planning.
         """
         return self.loop(problem, Stop(iterations=UNLIMITED))
 
-    def ends_where(self, other: Self) -> bool:  # noqa: ARG002
+    def ends_at_path_of(self, other: Self) -> bool:  # noqa: ARG002
         """Whether these settings end the run at the path at which `other` settings ended it."""
         return True
 
