@@ -19,7 +19,7 @@ from brrt.settings import Settings, param
 class Shortcut(Settings):
     """Pick two waypoints at random; replace those between by a direct motion if it is free.
 
-    The cost never rises and the ends never move.
+    The cost never increases, and start and goal do not change.
     """
 
     attempts: int = param(100, "pairs to try", low=0)
