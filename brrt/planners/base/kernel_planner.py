@@ -15,7 +15,7 @@ import numpy as np
 from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.event_log import EventLog
 from brrt.kernels.jit import prepared
-from brrt.kernels.random import borrow, give_back
+from brrt.kernels.random import copy_state, restore_state
 from brrt.planners.base.planner import Planner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
@@ -72,7 +72,7 @@ class KernelRun:
     ) -> None:
         log.reserve(kernel.max_events + 4)
         self._kernel, self._space, self._rng, self._log = kernel, problem.space, rng, log
-        self._draws = borrow(rng)
+        self._draws = copy_state(rng)
         self._advance = prepared(
             kernel.advance, kernel.state, self._space, self._draws, log.buffer, kernel.options, 0, 0
         )
@@ -135,12 +135,12 @@ class KernelRun:
             self._log.reserve(len(self._log) + kernel.max_events + 4)
         if seed is not None:
             self._rng.bit_generator.state = np.random.PCG64(seed).state
-            self._draws = borrow(self._rng)
+            self._draws = copy_state(self._rng)
 
     def finish(self, stop: Stop) -> Iterator[Events]:
         """Yield batches of events to the end of planning, by the budget or by the planner."""
         status = yield from self.advance(stop)
-        give_back(self._draws, self._rng)
+        restore_state(self._draws, self._rng)
         if status is not None:
             if self._log.room < 1:
                 yield self._log.drain()
