@@ -1,4 +1,4 @@
-"""Broad phase: which obstacles may a segment meet? A uniform grid, walked cell by cell."""
+"""Collision of segments with obstacles, with a uniform grid as the broad phase."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from brrt.kernels.jit import BORROWING, helper, inline_helper
+from brrt.kernels.jit import HELPER, helper, inline_helper
 from brrt.kernels.occupancy import ClearanceGrid, build_clearance_grid, segment_hits_cells
 from brrt.worlds.world import World
 
@@ -16,33 +16,33 @@ _CELLS_PER_OBSTACLE = 8.0
 _MAX_CELLS = 1 << 22
 _ENTRIES_PER_OBSTACLE = 64
 _PAD = 1e-6
-"""Obstacles are entered this part of a cell too wide, so that a walk which rounds to one side of
-a cell border still finds what touches the border from the other side."""
+"""Obstacles are enlarged by this part of a cell when they are entered, so that a traversal which
+rounds to one side of a cell border finds the obstacles that touch it from the other side."""
 
 _SLACK = 1e-15
 """Bound on the rounding of an entry or exit parameter in [0, 1]: the subtraction, the direction,
-its reciprocal and the product round once each, together by less than 4.5e-16 a parameter."""
+its reciprocal and the product round once each, together by less than 4.5e-16."""
 
 _TINY = 1e-290
 """A component of a segment below this counts as zero: its reciprocal would overflow."""
 
 
 class ObstacleGrid(NamedTuple):
-    """Balls, boxes and convex polygons behind a grid.
+    """Balls, boxes and convex polygons, and the grid that finds those near a segment.
 
-    The tuples have one number an axis, so that kernels are compiled for the dimension.
+    The tuples have one number per axis, so that kernels are compiled for the dimension.
 
     Attributes:
         lower: Least corner of the grid.
         cell: Edges of a cell.
         per_length: Their reciprocals.
         shape: Cells along each axis.
-        starts: Where each cell's entries begin in `items`, shape (cells + 1,).
+        starts: First entry of each cell in `items`, and the end, shape (cells + 1,).
         items: Obstacle numbers: balls first, then boxes, then polygons.
         balls: Centre and radius, shape (n, d + 1).
         boxes: Least corner and greatest corner, shape (m, 2 d).
         vertices: Vertices of all polygons, counter-clockwise, shape (v, 2).
-        corners: Where each polygon begins in `vertices`, and the end; shape (k + 1,).
+        corners: First row of each polygon in `vertices`, and the end, shape (k + 1,).
         cells: Occupancy grid of a 2D world.
     """
 
@@ -70,7 +70,7 @@ def bounding_boxes(world: World) -> tuple[Floats, Floats]:
 
 
 def build_obstacle_grid(world: World) -> ObstacleGrid:
-    """Enter a world's obstacles into a grid, about 8 cells an obstacle."""
+    """Enter a world's obstacles into a grid with about 8 cells per obstacle."""
     d = world.dim
     least, most = bounding_boxes(world)
     extent = world.upper - world.lower
@@ -115,7 +115,7 @@ def build_obstacle_grid(world: World) -> ObstacleGrid:
 def _entries(
     first: NDArray[np.int64], spans: NDArray[np.int64], shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """List every cell of every obstacle's box, sorted by cell: (starts, items)."""
+    """List the cells of all obstacles' boxes, sorted by cell: (starts, items)."""
     counts = spans.prod(axis=1)
     item = np.repeat(np.arange(len(counts)), counts)
     rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -139,10 +139,10 @@ def _cell_of(offset: float, per_length: float, count: int) -> int:
 
 @inline_helper
 def _crossing(offset: float, step: float, inverse: float, width: float, cell: int) -> float:
-    """Parameter at which a walk along one axis leaves a cell; never, where it stands still.
+    """Parameter at which a segment leaves a cell along one axis; infinite if it is parallel to it.
 
-    `offset` is from the grid's corner: far from the origin, coordinates themselves would round
-    by more than obstacles are padded.
+    `offset` counts from the grid's corner: far from the origin, coordinates would round by more
+    than obstacles are padded.
     """
     if abs(step) < _TINY:
         return np.inf
@@ -151,7 +151,7 @@ def _crossing(offset: float, step: float, inverse: float, width: float, cell: in
 
 @inline_helper
 def _inverse(step: float) -> float:
-    """Reciprocal of a component; 0, which nobody looks at, where it counts as zero."""
+    """Reciprocal of a component; 0, which is not used, if the component counts as zero."""
     return 0.0 if abs(step) < _TINY else 1.0 / step
 
 
@@ -159,7 +159,7 @@ def _inverse(step: float) -> float:
 def _hits_slab(
     x: float, step: float, inverse: float, low: float, high: float
 ) -> tuple[float, float]:
-    """Parameters between which a line lies within a slab; (inf, -inf) if it never does."""
+    """Parameters between which a line is inside a slab; (inf, -inf) if it never is."""
     if abs(step) < _TINY:
         if max(x, x + step) < low or min(x, x + step) > high:
             return np.inf, -np.inf
@@ -174,9 +174,10 @@ def _hits_hull(
 ) -> bool:
     """Whether the segment from (ax, ay) along (dx, dy) touches a convex polygon.
 
-    A line that separates the two runs along one of them (separating axes). Coordinates count from
-    a vertex or from the segment's first end, so each difference rounds once; a cross product of
-    two rounds by less than 1e-15 of its terms, and what is not apart by more is a hit.
+    By separating axes: a line that separates the two is parallel to an edge or to the segment.
+    Coordinates count from a vertex or from the segment's first end, so each difference rounds
+    once; a cross product of two differences rounds by less than 1e-15 of its terms, and a smaller
+    separation is a hit.
     """
     left, right, behind, beyond = True, True, True, True
     square = dx * dx + dy * dy
@@ -198,7 +199,7 @@ def _hits_hull(
         if max(start, start + (ex * dy - ey * dx)) < -slack:
             return False
         if end - first == 2:
-            # Past the end of a line segment its own direction is what separates.
+            # Beyond the end of a line segment, its own direction is a separating axis.
             slack = 3e-15 * (abs(ex) * (abs(px) + abs(dx)) + abs(ey) * (abs(py) + abs(dy)))
             start = ex * px + ey * py
             if max(start, start + (ex * dx + ey * dy)) < -slack:
@@ -213,9 +214,9 @@ def _hits_polygon(o: ObstacleGrid, polygon: int, line: tuple[float, float, float
     return _hits_hull(o.vertices, o.corners[polygon], o.corners[polygon + 1], ax, ay, dx, dy)
 
 
-@overload(_hits_polygon, strict=False, jit_options=BORROWING)  # type: ignore[arg-type]
+@overload(_hits_polygon, strict=False, jit_options=HELPER)  # type: ignore[arg-type]
 def _by_dimension(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
-    """Compile the test for polygons in 2D alone; 3D knows none."""
+    """Compile the test for polygons in 2D only; 3D worlds have none."""
     if len(o.types[0]) == 2:
         return _hits_polygon
 
@@ -231,9 +232,9 @@ def _hits_cells(o: ObstacleGrid, line: tuple[float, float, float, float]) -> boo
     return len(o.cells.clearance) > 0 and segment_hits_cells(o.cells, ax, ay, dx, dy)
 
 
-@overload(_hits_cells, strict=False, jit_options=BORROWING)  # type: ignore[arg-type]
+@overload(_hits_cells, strict=False, jit_options=HELPER)  # type: ignore[arg-type]
 def _in_the_plane(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
-    """Compile the walk for 2D alone."""
+    """Compile the test for occupancy grids in 2D only."""
     if len(o.types[0]) == 2:
         return _hits_cells
 
@@ -247,9 +248,9 @@ def _in_the_plane(o: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types ar
 def segment_hits(o: ObstacleGrid, A: Floats, i: int, B: Floats, j: int) -> bool:
     """Whether the closed segment from A[i] to B[j] touches an obstacle.
 
-    Decided by formulas, not by sampling: slabs for boxes, the closest point for balls, separating
-    axes for polygons, a walk for the cells of an occupancy grid. Rounding only ever turns a miss
-    by less than about 1e-15 of the lengths at hand into a hit.
+    The test is exact: slabs for boxes, the closest point for balls, separating axes for polygons, a
+    traversal of the cells of an occupancy grid. Rounding only turns misses by less than about 1e-15
+    of the lengths involved into hits.
 
     Args:
         o: The obstacles, d axes.
@@ -269,7 +270,7 @@ def segment_hits(o: ObstacleGrid, A: Floats, i: int, B: Floats, j: int) -> bool:
     cx, cy, cz = _cell_of(ox, o.per_length[0], nx), _cell_of(oy, o.per_length[1], ny), 0
     nz = 1
     if d == 3:
-        # A tuple of two has no constant index 2; `z` is one that the compiler looks up later.
+        # A constant index 2 is an error for tuples of two, which this also compiles for.
         z = d - 1
         az = A[i, z]
         dz = B[j, z] - az
@@ -291,8 +292,8 @@ def segment_hits(o: ObstacleGrid, A: Floats, i: int, B: Floats, j: int) -> bool:
                 radius = o.balls[item, d]
                 if d == 3:
                     pz = az - o.balls[item, 2]
-                # The distance rounds by less than this: 16 roundings of 1.1e-16, each of a length
-                # that is at most the sum. (Slack in the square would make small balls large.)
+                # Rounding of the distance: 16 roundings of 1.1e-16, each of a length that is at
+                # most the sum. (A slack added to the square would enlarge small balls.)
                 reach = radius + 2e-15 * (
                     abs(px) + abs(py) + abs(pz) + abs(dx) + abs(dy) + abs(dz) + radius
                 )

@@ -1,4 +1,4 @@
-"""The monotonic clock, readable from inside a kernel in about 30 ns."""
+"""The monotonic clock, which kernels read in about 30 ns."""
 
 import sys
 from typing import Any
@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 from brrt.kernels.jit import config
 
 _MONOTONIC = {"linux": 1, "darwin": 8}
-"""CLOCK_MONOTONIC on Linux, CLOCK_UPTIME_RAW on macOS: what `time.perf_counter_ns` reads."""
+"""CLOCK_MONOTONIC on Linux, CLOCK_UPTIME_RAW on macOS: the clocks of `time.perf_counter_ns`."""
 
 
 @intrinsic
@@ -34,13 +34,13 @@ def _clock_gettime(typingctx: Any, clock_id: Any) -> Any:  # noqa: ARG001
 
 
 if config.DISABLE_JIT or sys.platform not in _MONOTONIC:
-    # Without the compiler, and where the C library has no such clock, events of one batch share
-    # the time that the caller wrote into the buffer; `emit` keeps them apart by 1 ns.
+    # Without the compiler, or if the C library has no such clock, the events of a call get the
+    # time that Python wrote to the buffer before (`EventLog.tick`), each 1 ns after the last.
     COMPILED_CLOCK = False
 
     @numba.extending.register_jitable
     def now_ns() -> int:
-        """Return a time that is never ahead of the batch's own."""
+        """Return a time before that of any event."""
         return 0
 
 else:

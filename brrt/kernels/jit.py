@@ -1,4 +1,4 @@
-"""The one place that knows how kernels are compiled, and where the compiled code is kept."""
+"""How kernels are compiled, and where their compiled code is cached."""
 
 import hashlib
 import os
@@ -22,21 +22,21 @@ _SOURCES = ("events.py", "kernels", "planners")
 
 
 def _sources_digest() -> str:
-    """Digest of everything that a kernel is compiled from.
+    """Digest of all files that kernels are compiled from.
 
-    Numba looks at the time of the calling file alone, so a helper that was edited in another file
-    would go on running as it was.
+    Numba checks only the time of the file that it compiles, so without this a kernel would keep the
+    old version of a helper that was edited in another file.
     """
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
     for name in _SOURCES:
-        place = _PACKAGE / name
-        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+        path = _PACKAGE / name
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()[:16]
 
 
 def _cache_folder() -> Path | None:
-    """Make the folder for compiled code; None where nothing can be written."""
+    """Make the folder for compiled code; None if it cannot be written."""
     root = os.environ.get("BRRT_CACHE_DIR")
     folder = Path(root) if root else user_cache_path("brrt", appauthor=False)
     folder = folder / "kernels" / _sources_digest()
@@ -51,38 +51,38 @@ CACHE_FOLDER = _cache_folder()
 
 
 class _FirstCompilation(event.Listener):
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell: Callable[[], None] | None = tell
+    def __init__(self, notify: Callable[[], None]) -> None:
+        self._notify: Callable[[], None] | None = notify
 
     def on_start(self, event: Any) -> None:  # noqa: ARG002
-        tell, self._tell = self._tell, None
-        if tell is not None:
-            tell()
+        notify, self._notify = self._notify, None
+        if notify is not None:
+            notify()
 
     def on_end(self, event: Any) -> None:
         pass
 
 
-def on_compiling(tell: Callable[[], None]) -> None:
-    """Call `tell` once, as soon as something has to be compiled that is not kept from before."""
-    event.register("numba:compile", _FirstCompilation(tell))
+def on_compiling(notify: Callable[[], None]) -> None:
+    """Call `notify` once, before the first function that is not in the cache is compiled."""
+    event.register("numba:compile", _FirstCompilation(notify))
 
 
 def kernel(fn: F) -> F:
-    """Compile a loop that Python calls.
+    """Compile a function that Python calls.
 
-    Nopython mode with IEEE semantics, without the GIL, cached on disk. No fastmath: the same seed
-    gives the same bits on every machine.
+    In nopython mode with IEEE semantics, without the GIL, cached on disk. No fastmath: the same
+    seed gives the same bits on every machine.
     """
     return _compiled(fn, {"_nrt": False})
 
 
 def prepared(fn: F, *args: Any) -> F:
-    """Compile or load a kernel for arguments like these, and return its way in.
+    """Compile or load a kernel for arguments of these types, and return its entry point.
 
-    Numba looks up the type of every array in every argument at each call, 50 us for a planner's
-    and five times that with cold caches: longer than many a query takes to solve. The way in that
-    is returned knows them already; give it arguments of the same types.
+    At each call of a kernel numba determines the types of all arrays in its arguments. For a
+    planner that takes 50 us, five times that with cold caches, which is longer than many queries
+    take to solve. The entry point needs no types; call it with arguments of the same types.
     """
     if config.DISABLE_JIT:
         return fn
@@ -93,27 +93,28 @@ def prepared(fn: F, *args: Any) -> F:
 
 
 def inline_helper(fn: F) -> F:
-    """Compile `fn` as `kernel` does, into every kernel that calls it; Python cannot call it."""
-    return _compiled(fn, INLINED)
+    """Compile a function into every kernel that calls it; Python cannot call it."""
+    return _compiled(fn, INLINE_HELPER)
 
 
 def helper(fn: F) -> F:
-    """Compile `fn` as `inline_helper` does, but only once: for what is long or seldom called."""
-    return _compiled(fn, BORROWING)
+    """Compile a function that kernels call, only once: one that is long or rarely called."""
+    return _compiled(fn, HELPER)
 
 
-BORROWING: dict[str, Any] = {
+HELPER: dict[str, Any] = {
     "_nrt": False,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
     "nogil": True,
     "error_model": "numpy",
 }
-"""A call counts references to each array of a NamedTuple, atomically; in a loop of a microsecond
-that is most of the time. So what a kernel calls borrows its arguments, and neither makes nor keeps
-an array. Without the wrappers for Python it compiles in two thirds of the time."""
+"""Options of a function that kernels call. Numba would count the references to each array of a
+NamedTuple at each call, atomically, which takes most of a loop's time. Without that (`_nrt`), the
+function must not allocate or keep an array. Without wrappers for Python it compiles in two thirds
+of the time."""
 
-INLINED: dict[str, Any] = {**BORROWING, "forceinline": True}
+INLINE_HELPER: dict[str, Any] = {**HELPER, "forceinline": True}
 
 
 def _compiled(fn: F, options: dict[str, Any]) -> F:
@@ -136,21 +137,21 @@ def _compiled(fn: F, options: dict[str, Any]) -> F:
 
 
 def _plain(argument: Any) -> Any:
-    """Return the type that a callee is compiled for: one for all integers, none for constants.
+    """Return the type that a callee is compiled for: int64 for all integers, no literals.
 
-    Numba compiles it anew for each constant and each width that it is called with; a kernel would
-    take twice as long to compile, for nothing that inlining does not bring anyway.
+    Otherwise numba compiles it again for each constant and each width of an argument. That takes
+    twice as long, and inlining propagates constants anyway.
     """
     argument = types.unliteral(argument)
     return types.int64 if isinstance(argument, types.Integer) else argument
 
 
 def _refuse_python(dispatcher: Any) -> None:
-    """Let a call from Python be an error; without a wrapper it would be a crash."""
+    """Raise an error when Python calls the function, which has no wrapper and would crash."""
 
     def refuse(*args: Any, **kwargs: Any) -> None:  # noqa: ARG001
         name = dispatcher.py_func.__qualname__
-        raise TypeError(f"{name} is called by kernels alone; call it from a @kernel function")
+        raise TypeError(f"{name} can only be called by kernels; call it from a @kernel function")
 
     def keep(compiled: Any) -> None:
         dispatcher.overloads[tuple(compiled.signature.args)] = compiled

@@ -12,45 +12,44 @@ Floats = NDArray[np.float64]
 
 BUCKET = 16
 _FRESH = 12
-"""A rebuilt bucket holds at most this many, so that it need not split at once."""
+"""Most nodes of a bucket after rebuilding, so that it is not split soon."""
 
 _LEAF = -1
 _STACK = 256
-"""More than twice the depth that the balance allows for 2^31 nodes."""
+"""More than twice the depth of a balanced tree of 2^31 nodes."""
 
 _MEAN_FILL = 4
-"""Room is planned for buckets with at least this many nodes; they come to hold about 10."""
+"""Nodes per bucket for which arrays are allocated; the average is about 10."""
 
 _AXIS, _LEFT, _RIGHT, _SIZE = range(4)
-"""Columns of `KdTree.cells`; a leaf has its bucket on the left."""
+"""Columns of `KdTree.cells`; `_LEFT` of a leaf is its bucket."""
 
 _REBUILD_NEEDS = 4
-"""Buckets that must be left for a full one to be split."""
+"""Free buckets that are needed to split a full one."""
 
 _NODES, _CELLS, _BUCKETS, _FREE_CELLS, _FREE_BUCKETS = range(5)
 
 
 class KdTree(NamedTuple):
-    """Cells split once they hold more than 16 nodes, and are rebuilt once they are lopsided.
+    """A cell is split when it has more than 16 nodes, and rebuilt when it is unbalanced.
 
-    Coordinates stand twice, in the planner's array and side by side in the buckets, where a
-    query finds those of a leaf in a few lines of the cache. Several trees may share the arrays:
-    cell r is the root of the r-th.
+    Coordinates are stored twice, in the planner's array and in the buckets, where those of a leaf
+    fit into a few cache lines. Several trees may share the arrays: cell r is the root of tree r.
 
     Attributes:
-        cells: For each cell its splitting axis, the cells below and above, and its nodes; for a
-            leaf -1, its bucket, -1, and its nodes; shape (cells, 4).
-        boxes: Least and greatest coordinates of each cell's nodes, and where it splits; what a
-            query asks of a cell stands in two lines of the cache; shape (cells, 2 d + 1).
-        built: How many nodes each cell had when it was split or rebuilt, shape (cells,).
-        points: Coordinates, 16 rows a bucket, shape (16 buckets, d).
+        cells: Splitting axis, lower and upper child, and number of nodes of each cell; for a leaf
+            -1, its bucket, -1, and its number of nodes; shape (cells, 4).
+        boxes: Least and greatest coordinates of each cell's nodes, and the coordinate at which it
+            splits; together they fit into two cache lines; shape (cells, 2 d + 1).
+        built: Number of nodes of each cell when it was split or rebuilt, shape (cells,).
+        points: Coordinates, 16 rows per bucket, shape (16 buckets, d).
         nodes: Node number of each row, shape (16 buckets,).
-        counts: Nodes, cells and buckets in use, cells and buckets given back; shape (5,).
-        free_cells: Cells given back, shape (cells,).
-        free_buckets: Buckets given back, shape (buckets,).
+        counts: Nodes, cells and buckets in use, free cells and free buckets, shape (5,).
+        free_cells: Cells to use again, shape (cells,).
+        free_buckets: Buckets to use again, shape (buckets,).
         gathered: Nodes of a cell that is being rebuilt, shape (capacity,).
         stack: Cells to visit, shape (256,).
-        work: Cells to rebuild, and which of the gathered nodes are theirs, shape (256, 3).
+        work: Cells to rebuild, and their range of gathered nodes, shape (256, 3).
     """
 
     cells: NDArray[np.int32]
@@ -69,7 +68,7 @@ class KdTree(NamedTuple):
 def rooted_kdtree(roots: Floats, capacity: int) -> KdTree:
     """Make a tree for each root, shape (trees, d), with room for `capacity` nodes in all.
 
-    Node r is the root of the r-th. Memory is taken only as the trees fill.
+    Node r is the root of tree r.
     """
     trees, d = roots.shape
     tree = _empty_kdtree(d, max(capacity, trees))
@@ -86,7 +85,7 @@ def enlarged_kdtree(tree: KdTree, capacity: int) -> KdTree:
     """Return the same tree with room for `capacity` nodes."""
     larger = _empty_kdtree(tree.points.shape[1], capacity)
     cells, buckets = int(tree.counts[_CELLS]), int(tree.counts[_BUCKETS])
-    # Only what is in use: whatever is written takes memory.
+    # Copy only what is in use: memory is provided when it is written.
     used = dict.fromkeys(("cells", "boxes", "built"), cells)
     used |= dict.fromkeys(("points", "nodes"), BUCKET * buckets)
     used["counts"] = len(tree.counts)
@@ -123,7 +122,7 @@ def _buckets_left(tree: KdTree) -> int:
 
 @inline_helper
 def has_room(tree: KdTree) -> bool:
-    """Whether another node fits, even if it splits a bucket."""
+    """Whether another node fits, even if a bucket has to be split."""
     return _buckets_left(tree) >= _REBUILD_NEEDS and int(tree.counts[_NODES]) < len(tree.gathered)
 
 
@@ -147,7 +146,7 @@ def _new_bucket(tree: KdTree) -> int:
 
 @inline_helper
 def _stretch(tree: KdTree, cell: int, q: Floats, node: int, d: int) -> None:
-    """Let a cell's box reach a node."""
+    """Extend a cell's box to a node."""
     for k in range(d):
         tree.boxes[cell, k] = min(tree.boxes[cell, k], q[node, k])
         tree.boxes[cell, d + k] = max(tree.boxes[cell, d + k], q[node, k])
@@ -163,7 +162,7 @@ def _open_leaf(tree: KdTree, cell: int, bucket: int, d: int) -> None:
 
 @inline_helper
 def _put(tree: KdTree, cell: int, node: int, q: Floats, row: int, d: int) -> None:
-    """Add a node that stands at q[row] to a leaf that has room."""
+    """Add a node with the coordinates q[row] to a leaf that has room."""
     at = tree.cells[cell, _LEFT] * BUCKET + tree.cells[cell, _SIZE]
     _stretch(tree, cell, q, row, d)
     for k in range(d):
@@ -174,7 +173,7 @@ def _put(tree: KdTree, cell: int, node: int, q: Floats, row: int, d: int) -> Non
 
 @inline_helper
 def _widest_axis(tree: KdTree, cell: int, d: int) -> int:
-    """Return the longest side of a cell's box; -1 where all its nodes coincide."""
+    """Return the axis of the longest side of a cell's box; -1 if all its nodes coincide."""
     axis, widest = -1, 0.0
     for k in range(d):
         if tree.boxes[cell, d + k] - tree.boxes[cell, k] > widest:
@@ -184,7 +183,7 @@ def _widest_axis(tree: KdTree, cell: int, d: int) -> int:
 
 @inline_helper
 def _gather(tree: KdTree, root: int) -> int:
-    """List the nodes below a cell, give back all cells and buckets but itself; return how many."""
+    """List the nodes below a cell and free its descendants and buckets; return their number."""
     n, top = 0, 1
     tree.stack[0] = root
     while top > 0:
@@ -208,7 +207,7 @@ def _gather(tree: KdTree, root: int) -> int:
 
 @inline_helper
 def _partition(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int, split: float) -> int:
-    """Put the nodes below the split first; return where the others begin."""
+    """Move the nodes below the split to the front; return the index of the first other one."""
     middle = lo
     for i in range(lo, hi):
         if q[ids[i], axis] < split:
@@ -219,7 +218,7 @@ def _partition(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int, s
 
 @inline_helper
 def _median(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int) -> float:
-    """Coordinate of the middle one of the nodes ids[lo:hi] (quickselect, in place)."""
+    """Coordinate of the median of the nodes ids[lo:hi] (quickselect, in place)."""
     middle = (lo + hi) // 2
     left, right = lo, hi - 1
     while left < right:
@@ -245,7 +244,7 @@ def _median(ids: NDArray[np.int32], lo: int, hi: int, q: Floats, axis: int) -> f
 
 @helper
 def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
-    """Build a cell anew, halving at the median of its longest side down to the buckets."""
+    """Rebuild a cell by halving at the median of the longest side, down to the buckets."""
     if _buckets_left(tree) < max(tree.cells[root, _SIZE] // 4, _REBUILD_NEEDS):
         return
     tree.work[0, 0], tree.work[0, 1], tree.work[0, 2] = root, 0, _gather(tree, root)
@@ -266,7 +265,7 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
             continue
         split = _median(ids, lo, hi, q, axis)
         if split <= tree.boxes[cell, axis]:
-            # Half of them share the least coordinate: split right above it.
+            # Half of the nodes have the least coordinate: split at the next one.
             least, split = split, np.inf
             for i in range(lo, hi):
                 if q[ids[i], axis] > least:
@@ -282,26 +281,26 @@ def _rebuild(tree: KdTree, q: Floats, root: int, d: int) -> None:
 
 @inline_helper
 def _side(tree: KdTree, cell: int, x: float, d: int) -> int:
-    """Return the child that holds a coordinate along the splitting axis."""
+    """Return the child for a coordinate along the splitting axis."""
     return int(tree.cells[cell, _RIGHT if x >= tree.boxes[cell, 2 * d] else _LEFT])
 
 
 @helper
 def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
-    """Share a full leaf's nodes between two new leaves, at the mean of its longest side."""
+    """Divide a full leaf's nodes between two new leaves, at their mean along an axis."""
     bucket, other = tree.cells[cell, _LEFT], _new_bucket(tree)
     left, right = _new_cell(tree), _new_cell(tree)
     first = bucket * BUCKET
     mean = 0.0
     for at in range(first, first + BUCKET):
         mean += tree.points[at, axis] / BUCKET
-    # Rounding could put the mean beyond them all, and then one leaf would get every node.
+    # Because of rounding the mean may be beyond all nodes, and one leaf would get them all.
     low, high = tree.boxes[cell, axis], tree.boxes[cell, d + axis]
     split = mean if low < mean <= high else high
     _open_leaf(tree, left, bucket, d)
     _open_leaf(tree, right, other, d)
     for at in range(first, first + BUCKET):
-        # The left leaf takes over the bucket, and fills it no faster than it is read.
+        # The left leaf reuses the bucket; it is never filled faster than it is read.
         child = right if tree.points[at, axis] >= split else left
         _put(tree, child, tree.nodes[at], tree.points, at, d)
     tree.cells[cell, _AXIS], tree.boxes[cell, 2 * d] = axis, split
@@ -311,27 +310,27 @@ def _split(tree: KdTree, cell: int, axis: int, d: int) -> None:
 
 @inline_helper
 def insert(tree: KdTree, space: Any, q: Floats, node: int, root: int) -> None:
-    """Add a node that stands at q[node] to a tree; the caller saw to it that it `has_room`.
+    """Add node q[node] to a tree, which must have room (`has_room`).
 
-    A cell with 3/4 of its nodes on one side is rebuilt: trees grow outwards, and without this
-    their frontier would lie ever deeper (a scapegoat tree; Galperin and Rivest 1993). A node that
-    coincides with 16 others is left out: they answer for it.
+    A cell with 3/4 of its nodes on one side is rebuilt (a scapegoat tree; Galperin and Rivest
+    1993): planners' trees grow outwards, so without this their frontier would become ever deeper.
+    A node that coincides with 16 others is left out, as they are equally near to every query.
     """
     d = len(space.lower)
-    cell, lopsided = root, -1
+    cell, unbalanced = root, -1
     while tree.cells[cell, _AXIS] != _LEAF:
         _stretch(tree, cell, q, node, d)
         tree.cells[cell, _SIZE] += 1
         child = _side(tree, cell, q[node, tree.cells[cell, _AXIS]], d)
         size = tree.cells[cell, _SIZE]
         uneven = 4 * tree.cells[child, _SIZE] > 3 * size + 4 * BUCKET
-        # Halves become that uneven only once there are twice as many nodes. A cell that cannot be
-        # halved, because most of its nodes share a coordinate, has to wait as long.
-        if lopsided < 0 and uneven and size >= 2 * tree.built[cell]:
-            lopsided = cell
+        # Equal halves become that uneven only after the number of nodes has doubled. A cell that
+        # cannot be halved, because most nodes have the same coordinate, is not rebuilt earlier.
+        if unbalanced < 0 and uneven and size >= 2 * tree.built[cell]:
+            unbalanced = cell
         cell = child
     if tree.cells[cell, _SIZE] == BUCKET:
-        # The box with the new node in it: 16 that coincide must still make way for another.
+        # Include the new node in the box: 16 nodes that coincide are split for another one.
         _stretch(tree, cell, q, node, d)
         axis = _widest_axis(tree, cell, d)
         if axis < 0:
@@ -341,16 +340,16 @@ def insert(tree: KdTree, space: Any, q: Floats, node: int, root: int) -> None:
         cell = _side(tree, cell, q[node, axis], d)
     _put(tree, cell, node, q, node, d)
     tree.counts[_NODES] += 1
-    if lopsided >= 0:
-        _rebuild(tree, q, lopsided, d)
+    if unbalanced >= 0:
+        _rebuild(tree, q, unbalanced, d)
 
 
 @inline_helper
 def nearest(tree: KdTree, space: Any, Q: Floats, row: int, root: int) -> int:
-    """Return a tree's node nearest to Q[row] in the robot's metric.
+    """Return a tree's nearest node to Q[row] in the robot's metric.
 
-    Each cell knows the box around its nodes. The half-space that a split leaves would not do:
-    most samples lie far from a young tree, and its outer cells would have no end on that side.
+    Cells are pruned by the boxes of their nodes, not by the half-spaces of the splits: most samples
+    are far from a young tree, whose outer cells would be unbounded on that side.
     """
     d, stack = len(space.lower), tree.stack
     best, node, cell, top = np.inf, -1, root, 0
@@ -385,20 +384,20 @@ def near(
     found: NDArray[np.int32],
     far: Floats,
 ) -> int:
-    """List a tree's nodes within a radius of Q[row], in no order that means anything.
+    """List a tree's nodes within a radius of Q[row], in arbitrary order.
 
     Args:
         tree: The trees.
         space: Configuration space.
         Q: Configurations, shape (n, d).
-        row: Which of them.
-        root: Which tree.
+        row: Row of the configuration in Q.
+        root: Number of the tree.
         radius: Greatest distance in the robot's metric.
-        found: Where the nodes are written, as long as there are nodes.
-        far: Where their distances are written, of the same shape.
+        found: The nodes are written here; it has room for all nodes.
+        far: Their distances are written here; same shape.
 
     Returns:
-        How many there are.
+        Their number.
     """
     stack, top, count = tree.stack, 1, 0
     stack[0] = root

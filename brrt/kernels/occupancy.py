@@ -1,4 +1,4 @@
-"""Segments among the cells of an occupancy grid: walked exactly, over free stretches in strides."""
+"""Collision of segments with the blocked cells of an occupancy grid."""
 
 from typing import NamedTuple
 
@@ -9,19 +9,19 @@ from brrt.kernels.jit import helper, inline_helper
 from brrt.worlds.world import World
 
 _STRIDES = 16
-"""Longest stride, in cells: what finding them costs grows with it."""
+"""Longest stride, in cells; the time to compute the clearances grows with it."""
 
 _SLACK = 4e-15
-"""Bound on the rounding of a place among the cells, as a part of the lengths at hand: six
-roundings of 1.1e-16 on the way to the grid's axes, and four along the segment."""
+"""Bound on the rounding of a position in the grid, as a part of the lengths that it is computed
+from: six roundings of 1.1e-16 for the grid's axes, and four along the segment."""
 
 
 class ClearanceGrid(NamedTuple):
-    """An occupancy grid.
+    """An occupancy grid with the clearance of each cell.
 
     Attributes:
-        clearance: 0 in blocked cells; k where all cells less than k columns and rows away are
-            free; shape (rows, columns). Empty where a world has no grid.
+        clearance: 0 in blocked cells; k if all cells less than k columns and rows away are free;
+            shape (rows, columns). Empty if the world has no grid.
         frame: Origin x and y, cosine and sine of the yaw, cells per unit of length.
     """
 
@@ -30,35 +30,35 @@ class ClearanceGrid(NamedTuple):
 
 
 def build_clearance_grid(world: World) -> ClearanceGrid:
-    """Find how far each cell of a world's grid is from blocked ones.
+    """Compute the clearance of each cell of a world's grid.
 
-    Where the world reaches beyond the grid, a ring of blocked cells stands for all outside.
+    If the world reaches beyond the grid, a ring of blocked cells is added.
     """
     grid = world.grid
     if grid is None:
         return ClearanceGrid(np.empty((0, 0), np.uint8), (0.0, 0.0, 1.0, 0.0, 1.0))
-    taken, origin = grid.cells, grid.origin
+    blocked, origin = grid.cells, grid.origin
     if not grid.contains_box(world.lower, world.upper):
-        taken, origin = (
-            np.pad(taken, 1, constant_values=True),
+        blocked, origin = (
+            np.pad(blocked, 1, constant_values=True),
             grid.to_world(np.full(2, -grid.resolution)),
         )
-    clearance = np.where(taken, 0, 1).astype(np.uint8)
+    clearance = np.where(blocked, 0, 1).astype(np.uint8)
     for _ in range(_STRIDES - 1):
-        taken = _wider(taken)
-        clearance += ~taken
+        blocked = _dilated(blocked)
+        clearance += ~blocked
     cos, sin = grid.axes
     return ClearanceGrid(clearance, (*origin.tolist(), cos, sin, 1.0 / grid.resolution))
 
 
-def _wider(taken: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Add all neighbours, corners included."""
+def _dilated(blocked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Add the eight neighbours of each cell."""
     for first, last in ((np.s_[1:], np.s_[:-1]), (np.s_[:, 1:], np.s_[:, :-1])):
-        wider = taken.copy()
-        wider[first] |= taken[last]
-        wider[last] |= taken[first]
-        taken = wider
-    return taken
+        larger = blocked.copy()
+        larger[first] |= blocked[last]
+        larger[last] |= blocked[first]
+        blocked = larger
+    return blocked
 
 
 @inline_helper
@@ -70,9 +70,9 @@ def _cell(at: float, count: int) -> int:
 def segment_hits_cells(cells: ClearanceGrid, ax: float, ay: float, dx: float, dy: float) -> bool:
     """Whether the closed segment from (ax, ay) along (dx, dy) touches a blocked cell.
 
-    The segment is walked along its longer side, column by column; a corner that it passes belongs
-    to all four cells around it, so none is cut. From a cell with clearance k the next k - 1
-    columns need no look: a segment gets away by a row a column at most.
+    The segment is traversed along its longer side, column by column; a corner belongs to all four
+    cells around it. After a cell with clearance k the next k - 1 columns are skipped, because a
+    segment rises by at most one row in a column.
     """
     clearance, (ox, oy, cos, sin, per_length) = cells.clearance, cells.frame
     px, py = ax - ox, ay - oy
@@ -87,7 +87,7 @@ def segment_hits_cells(cells: ClearanceGrid, ax: float, ay: float, dx: float, dy
     low, high = min(u, u + du), max(u, u + du)
     column, last = _cell(low - slack, columns), _cell(high + slack, columns)
     while column <= last:
-        # Outside the grid, by rounding or for good, is where its outermost cells are.
+        # The outermost cells extend to everything outside the grid.
         left = low if column == 0 else min(max(low, float(column)), high)
         right = high if column == columns - 1 else max(min(high, column + 1.0), low)
         one, two = v + (left - u) * slope, v + (right - u) * slope

@@ -1,8 +1,7 @@
-"""Random numbers inside kernels: the same bits that numpy's `Generator(PCG64(seed))` draws.
+"""Random numbers in kernels: the same bits that numpy's `Generator(PCG64(seed))` draws.
 
-Numba can take a Generator as it is, but needs 140 us with cold caches to find its way into one:
-twice as long as an easy query takes to solve. Here the state of PCG64 (O'Neill 2014, XSL-RR, 128
-bits) is an array.
+Numba accepts a Generator, but needs 140 us with cold caches to access it, twice as long as an easy
+query takes to solve. Here the state of PCG64 (O'Neill 2014, XSL-RR, 128 bits) is an array.
 """
 
 from typing import Any, NamedTuple
@@ -22,7 +21,7 @@ _TO_UNIT = 1.0 / (1 << 53)
 
 
 class Random(NamedTuple):
-    """A generator as kernels see it.
+    """The state of a generator.
 
     Attributes:
         words: State and increment, the high word of each first, shape (4,).
@@ -31,11 +30,11 @@ class Random(NamedTuple):
     words: NDArray[np.uint64]
 
 
-def borrow(rng: np.random.Generator) -> Random:
-    """Take over a generator's state; `give_back` when done.
+def copy_state(rng: np.random.Generator) -> Random:
+    """Return the state of a generator; `restore_state` writes it back.
 
     Raises:
-        TypeError: It is no PCG64.
+        TypeError: The generator is not a PCG64.
     """
     state: Any = rng.bit_generator.state
     if state["bit_generator"] != "PCG64":
@@ -45,8 +44,8 @@ def borrow(rng: np.random.Generator) -> Random:
     return Random(np.array([w for n in both for w in (n >> 64, n & _LOW)], np.uint64))
 
 
-def give_back(draws: Random, rng: np.random.Generator) -> None:
-    """Let a generator go on where kernels stopped drawing."""
+def restore_state(draws: Random, rng: np.random.Generator) -> None:
+    """Set a generator to the state after the draws of kernels."""
     high, low = (int(word) for word in draws.words[:2])
     state: Any = rng.bit_generator.state
     state["state"]["state"] = high << 64 | low

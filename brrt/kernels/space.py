@@ -13,7 +13,7 @@ from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from brrt.kernels.jit import INLINED, inline_helper
+from brrt.kernels.jit import INLINE_HELPER, inline_helper
 from brrt.kernels.random import Random, uniform
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ def by_space(function: F, default: Any = None) -> F:
         default: The kernel for spaces that have none of that name.
     """
 
-    @overload(function, strict=False, jit_options=INLINED)  # type: ignore[arg-type]
+    @overload(function, strict=False, jit_options=INLINE_HELPER)  # type: ignore[arg-type]
     def resolve(space: Any, *rest: Any) -> Any:  # noqa: ARG001 - numba's types are untyped
         if isinstance(space, types.BaseNamedTuple):
             kernels = space.instance_class  # type: ignore[attr-defined]

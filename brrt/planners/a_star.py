@@ -77,8 +77,8 @@ class AStar(LatticePlanner):
         grid = contract.Lattice(self.epsilon, self.diagonals, self.max_move, lookahead=None)
         return contract.Contract(lattice=grid)
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
-        """See `KernelPlanner.loop`."""
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
+        """See `KernelPlanner.kernel`."""
         lattice = self._lattice(problem)
         state = _a_star.AStarState(
             lattice, empty_search(len(lattice.keys)), np.zeros(_a_star.COUNTS, np.int64)

@@ -56,14 +56,14 @@ class BiRRT(KernelPlanner):
         draws = Draws(coin=0.5 if self.turn == "coin" else 0.0)
         return Contract(step=step, link=step, draws=draws, growth=growth, stops=True)
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
-        """See `KernelPlanner.loop`."""
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.kernel`."""
         step = step_length(self.step, problem)
         options = _bi_rrt.BiRRTOptions(
             step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
             self.always_link,
         )  # fmt: skip
-        return loop_of(options, problem, stop)
+        return make_kernel(options, problem, stop)
 
 
 def step_length(step: float | None, query: Query, part: float = 0.05) -> float:
@@ -71,10 +71,10 @@ def step_length(step: float | None, query: Query, part: float = 0.05) -> float:
     return step or part * query.world.extent
 
 
-def loop_of(
+def make_kernel(
     options: _bi_rrt.BiRRTOptions, problem: Problem, stop: Stop
 ) -> Kernel[_bi_rrt.BiRRTState]:
-    """Make the loop of any variant; see `KernelPlanner.loop`."""
+    """Make the loop of any variant; see `KernelPlanner.kernel`."""
     roots = np.array([problem.start, problem.goal])
     counts = np.zeros(_bi_rrt.COUNTS, np.int64)
     counts[_bi_rrt.NEWEST + 1] = 1

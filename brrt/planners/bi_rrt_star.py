@@ -9,7 +9,7 @@ from brrt.planners import _rrt_star
 from brrt.planners.base.kernel_planner import Kernel
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
-from brrt.planners.rrt_star import StarPlanner, loop_of
+from brrt.planners.rrt_star import StarPlanner, make_kernel
 from brrt.scenario.query import Query
 from brrt.settings import param
 
@@ -34,7 +34,7 @@ class BiRRTStar(StarPlanner):
         options = StarPlanner.options(self, query)
         return options._replace(link=self.connect_distance or options.step)
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
-        """See `KernelPlanner.loop`."""
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.kernel`."""
         roots = np.array([problem.start, problem.goal])
-        return loop_of(self.options(problem), roots, problem, stop)
+        return make_kernel(self.options(problem), roots, problem, stop)

@@ -44,17 +44,17 @@ class LRTAStar(LatticePlanner):
         )  # fmt: skip
         return contract.Contract(lattice=grid)
 
-    def open_ended_loop(self, problem: Problem) -> Kernel[Any]:
-        """See `KernelPlanner.open_ended_loop`."""
-        loop = self.loop(problem, Stop(iterations=UNLIMITED))
-        return replace(loop, options=loop.options._replace(open_ended=True))
+    def replan_kernel(self, problem: Problem) -> Kernel[Any]:
+        """See `KernelPlanner.replan_kernel`."""
+        kernel = self.kernel(problem, Stop(iterations=UNLIMITED))
+        return replace(kernel, options=kernel.options._replace(open_ended=True))
 
-    def ends_at_path_of(self, other: Self) -> bool:
-        """See `KernelPlanner.ends_at_path_of`."""
+    def ends_like(self, other: Self) -> bool:
+        """See `KernelPlanner.ends_like`."""
         return self.trials <= other.trials
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
-        """See `KernelPlanner.loop`."""
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
+        """See `KernelPlanner.kernel`."""
         lattice = self._lattice(problem)
         state = _lrta_star.LRTAStarState(
             lattice=lattice,

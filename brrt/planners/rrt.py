@@ -56,8 +56,8 @@ class RRT(KernelPlanner):
     def _step(self, query: Query) -> float:
         return self.step or 0.05 * query.world.extent
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
-        """See `KernelPlanner.loop`."""
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.kernel`."""
         options = _rrt.RRTOptions(
             step=self._step(problem),
             goal_bias=self.goal_bias,

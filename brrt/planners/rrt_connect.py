@@ -28,9 +28,9 @@ class RRTConnect(KernelPlanner):
         """See `Planner.contract`."""
         return self._variant.contract(query)
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
-        """See `KernelPlanner.loop`."""
-        return self._variant.loop(problem, stop)
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.kernel`."""
+        return self._variant.kernel(problem, stop)
 
     @property
     def _variant(self) -> BiRRT:

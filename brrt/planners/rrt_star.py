@@ -59,12 +59,12 @@ class StarPlanner(KernelPlanner):
             stops=options.stop_at_first,
         )
 
-    def open_ended_loop(self, problem: Problem) -> Kernel[Any]:
-        """See `KernelPlanner.open_ended_loop`."""
-        return replace(self, stop_at_first=False).loop(problem, Stop(iterations=UNLIMITED))
+    def replan_kernel(self, problem: Problem) -> Kernel[Any]:
+        """See `KernelPlanner.replan_kernel`."""
+        return replace(self, stop_at_first=False).kernel(problem, Stop(iterations=UNLIMITED))
 
-    def ends_at_path_of(self, other: Self) -> bool:  # noqa: ARG002
-        """See `KernelPlanner.ends_at_path_of`."""
+    def ends_like(self, other: Self) -> bool:  # noqa: ARG002
+        """See `KernelPlanner.ends_like`."""
         return self.stop_at_first
 
     def options(self, query: Query) -> _rrt_star.RRTStarOptions:
@@ -99,9 +99,9 @@ class RRTStar(StarPlanner):
         """See `StarPlanner.options`."""
         return StarPlanner.options(self, query)._replace(goal_bias=self.goal_bias)
 
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
-        """See `KernelPlanner.loop`."""
-        return loop_of(self.options(problem), problem.start[None], problem, stop)
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+        """See `KernelPlanner.kernel`."""
+        return make_kernel(self.options(problem), problem.start[None], problem, stop)
 
 
 def proven_gamma(query: Query) -> float:
@@ -116,7 +116,7 @@ def proven_gamma(query: Query) -> float:
     return float(1.1 * (2 * (1 + 1 / d) * volume / ball) ** (1 / d))
 
 
-def loop_of(
+def make_kernel(
     options: _rrt_star.RRTStarOptions, roots: np.ndarray, problem: Problem, stop: Stop
 ) -> Kernel[_rrt_star.RRTStarState]:
     """Make the loop for one tree or two, by their roots, shape (trees, dof)."""

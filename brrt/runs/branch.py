@@ -76,7 +76,7 @@ class BranchedRun(RecordedRun):
         run = restored(shared, before, self.problem, self._rng, self._log)
         if not after:
             _check_budget(recording, run, shared.t, self.stop)
-        run.switch_settings(planner.loop(self.problem, self.stop), seed)
+        run.switch_settings(planner.kernel(self.problem, self.stop), seed)
         self._planner = Continuation(run, shared)
         here = Branch(
             parent=recording.manifest.digest(),
@@ -175,7 +175,7 @@ def _check_open(
         BrrtError: The run ended with a path and the new settings stop there too, or with the proof
             that there is no path.
     """
-    if ended is Status.SOLVED and now.ends_at_path_of(before):
+    if ended is Status.SOLVED and now.ends_like(before):
         remedy = f", or {now.resume_hint}" if now.resume_hint else ""
         outcome = "its path"
     elif ended is Status.NO_PATH:

@@ -144,7 +144,7 @@ def _started(
 
 
 def _replan_kernel(scenario: Scenario, problem: Problem) -> Kernel[Any]:
-    return kernel_planner(scenario).open_ended_loop(problem)
+    return kernel_planner(scenario).replan_kernel(problem)
 
 
 def _replan(
@@ -152,9 +152,9 @@ def _replan(
 ) -> Iterator[Events]:
     """Plan to the end of an iteration, with the settings of each stretch of the manifest."""
     for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
-        yield from run.run_to(Stop(iterations=UNLIMITED, draws=branch.iteration))
+        yield from run.advance(Stop(iterations=UNLIMITED, draws=branch.iteration))
         run.switch_settings(_replan_kernel(after, problem), branch.seed)
-    yield from run.run_to(Stop(iterations=UNLIMITED, draws=iteration))
+    yield from run.advance(Stop(iterations=UNLIMITED, draws=iteration))
     yield log.drain()
 
 
@@ -211,5 +211,5 @@ class BranchedPlan:
         before = replace(self.manifest, branches=tuple(earlier), scenario=last.scenario)
         run = _started(before, problem, rng, log)
         yield from _replan(run, before, problem, log, last.iteration)
-        run.switch_settings(kernel_planner(self.manifest.scenario).loop(problem, stop), last.seed)
+        run.switch_settings(kernel_planner(self.manifest.scenario).kernel(problem, stop), last.seed)
         yield from run.finish(stop)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brrt.kernels.jit import config, kernel
-from brrt.kernels.random import Random, borrow, give_back, uniform
+from brrt.kernels.random import Random, copy_state, restore_state, uniform
 from brrt.kernels.space import distance, sample_informed, sample_uniform
 from brrt.kernels.spaces.point import PointSpace, point_space
 from brrt.robots import Point
@@ -49,9 +49,9 @@ def fill_by_rejection(
 
 def drawn(rng: np.random.Generator, n: int) -> Floats:
     """Numbers that kernels draw from a generator, which then goes on behind them."""
-    out, draws = np.empty(n), borrow(rng)
+    out, draws = np.empty(n), copy_state(rng)
     fill(draws, out)
-    give_back(draws, rng)
+    restore_state(draws, rng)
     return out
 
 
@@ -108,7 +108,7 @@ def test_give_back_keeps_what_is_not_the_state() -> None:
 def test_borrowing_changes_nothing_until_it_is_given_back() -> None:
     """A generator that was lent is as it was."""
     rng, same = pcg(5), pcg(5)
-    fill(borrow(rng), np.empty(10))
+    fill(copy_state(rng), np.empty(10))
     assert rng.random() == same.random()
 
 
@@ -116,7 +116,7 @@ def test_borrowing_changes_nothing_until_it_is_given_back() -> None:
 def test_other_generators_are_refused(other: type[np.random.BitGenerator]) -> None:
     """A state that looks alike would give other numbers than it should."""
     with pytest.raises(TypeError, match="draw from PCG64, not from"):
-        borrow(np.random.Generator(other(0)))
+        copy_state(np.random.Generator(other(0)))
 
 
 ELLIPSES = [
@@ -141,7 +141,7 @@ def unit_space(dim: int) -> PointSpace:
 def informed(ends: Floats, best: float, n: int, seed: int = 0) -> Floats:
     """Configurations over which a path may be better, n of them."""
     out = np.empty((n, ends.shape[1]))
-    fill_informed(unit_space(ends.shape[1]), borrow(pcg(seed)), ends, best, out)
+    fill_informed(unit_space(ends.shape[1]), copy_state(pcg(seed)), ends, best, out)
     return out
 
 
@@ -186,7 +186,7 @@ def test_informed_samples_are_spread_evenly(
     ends, n, many = np.array([start, goal]), 20_000, 400_000
     best = stretch * float(ways(ends, ends[:1])[0])
     wanted = np.empty((many, len(start)))
-    fill_by_rejection(unit_space(len(start)), borrow(pcg(1)), ends, best, wanted)
+    fill_by_rejection(unit_space(len(start)), copy_state(pcg(1)), ends, best, wanted)
     q = informed(ends, best, n)
     # What rejection finds is uncertain as well: by less than this part of its shares.
     margin = 6 * math.sqrt(0.1 * 0.9 / many)

@@ -1,1 +1,1 @@
-"""What planners share: the problem, the budget, the interface, the compiled loop."""
+"""The base of planners: the problem, the budget, the interface, and running a compiled loop."""

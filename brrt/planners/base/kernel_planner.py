@@ -15,7 +15,7 @@ import numpy as np
 from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.event_log import EventLog
 from brrt.kernels.jit import prepared
-from brrt.kernels.random import borrow, give_back
+from brrt.kernels.random import copy_state, restore_state
 from brrt.planners.base.planner import Planner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
@@ -59,20 +59,20 @@ class KernelRun:
     """A run of a compiled loop: to the end of a budget, and from there with other settings.
 
     Args:
-        loop: The loop.
+        kernel: The loop, in its initial state.
         problem: Robot, world, start and goal.
         rng: Source of all random draws.
         log: Numbers and times the events.
     """
 
     def __init__(
-        self, loop: Kernel[Any], problem: Problem, rng: np.random.Generator, log: EventLog
+        self, kernel: Kernel[Any], problem: Problem, rng: np.random.Generator, log: EventLog
     ) -> None:
-        log.reserve(loop.max_events + 4)
-        self._loop, self._space, self._rng, self._log = loop, problem.space, rng, log
-        self._draws = borrow(rng)
+        log.reserve(kernel.max_events + 4)
+        self._kernel, self._space, self._rng, self._log = kernel, problem.space, rng, log
+        self._draws = copy_state(rng)
         self._advance = prepared(
-            loop.advance, loop.state, self._space, self._draws, log.buffer, loop.options, 0, 0
+            kernel.advance, kernel.state, self._space, self._draws, log.buffer, kernel.options, 0, 0
         )
         log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
         self._began = log.elapsed_s
@@ -81,22 +81,22 @@ class KernelRun:
     @property
     def counted(self) -> int:
         """Number of iterations so far that count."""
-        return int(self._loop.state.counts[COUNTED])
+        return int(self._kernel.state.counts[COUNTED])
 
     @property
     def drawn(self) -> int:
         """Number of draws so far, whether they count or not."""
-        return int(self._loop.state.counts[DRAWS])
+        return int(self._kernel.state.counts[DRAWS])
 
-    def run_to(self, stop: Stop) -> Generator[Events, None, Status | None]:
+    def advance(self, stop: Stop) -> Generator[Events, None, Status | None]:
         """Yield batches of events up to the end of a budget.
 
         Returns:
             Why it ended, which is not in the log yet; None if the loop has emitted the end of
             planning.
         """
-        loop, log, counts = self._loop, self._log, self._loop.state.counts
-        draw_limit = loop.draw_limit if stop.draws is None else min(loop.draw_limit, stop.draws)
+        kernel, log, counts = self._kernel, self._log, self._kernel.state.counts
+        draw_limit = kernel.draw_limit if stop.draws is None else min(kernel.draw_limit, stop.draws)
         while not self._ended:
             if log.overdue:
                 yield log.drain()
@@ -104,8 +104,9 @@ class KernelRun:
             # If a stop is due, the loop still emits what it has found.
             limit = self.counted if due is not None else self.counted + stop.share(self.counted)
             log.tick()
+            state, options, space = kernel.state, kernel.options, self._space
             result = self._advance(
-                loop.state, self._space, self._draws, log.buffer, loop.options, limit, draw_limit
+                state, space, self._draws, log.buffer, options, limit, draw_limit
             )
             if result == ENDED:
                 self._ended = True
@@ -113,31 +114,31 @@ class KernelRun:
                 yield log.drain()
                 log.reserve(int(counts[EVENTS]), int(counts[POINTS]))
             elif result == STATE_FULL:
-                loop.state = loop.enlarged(loop.state)
+                kernel.state = kernel.enlarged(state)
             elif due is None and counts[DRAWS] >= draw_limit:
                 return Status.ITERATION_LIMIT
             elif due is not None:
                 return due
         return None
 
-    def switch_settings(self, loop: Kernel[Any], seed: int | None) -> None:
+    def switch_settings(self, kernel: Kernel[Any], seed: int | None) -> None:
         """Switch to the settings of another loop of the same planner, between two iterations.
 
         Args:
-            loop: The loop with the new settings; its state is not used.
+            kernel: The loop with the new settings; its state is not used.
             seed: Seed of the draws from here on; None to continue with the same generator.
         """
-        self._loop = replace(loop, state=self._loop.state)
-        if self._log.room < loop.max_events + 4:
-            self._log.reserve(len(self._log) + loop.max_events + 4)
+        self._kernel = replace(kernel, state=self._kernel.state)
+        if self._log.room < kernel.max_events + 4:
+            self._log.reserve(len(self._log) + kernel.max_events + 4)
         if seed is not None:
             self._rng.bit_generator.state = np.random.PCG64(seed).state
-            self._draws = borrow(self._rng)
+            self._draws = copy_state(self._rng)
 
     def finish(self, stop: Stop) -> Iterator[Events]:
         """Yield batches of events to the end of planning, by the budget or by the planner."""
-        status = yield from self.run_to(stop)
-        give_back(self._draws, self._rng)
+        status = yield from self.advance(stop)
+        restore_state(self._draws, self._rng)
         if status is not None:
             if self._log.room < 1:
                 yield self._log.drain()
@@ -156,7 +157,7 @@ class KernelPlanner(Planner):
     resume_hint: ClassVar[str] = ""
 
     @abstractmethod
-    def loop(self, problem: Problem, stop: Stop) -> Kernel[Any]:
+    def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """Make the loop in its initial state.
 
         Args:
@@ -164,14 +165,14 @@ class KernelPlanner(Planner):
             stop: The budget, by which arrays are allocated.
         """
 
-    def open_ended_loop(self, problem: Problem) -> Kernel[Any]:
+    def replan_kernel(self, problem: Problem) -> Kernel[Any]:
         """Make the loop that reproduces the beginning of a run, up to a number of draws.
 
         If a run that ended with a path can continue, it does not emit the end of planning.
         """
-        return self.loop(problem, Stop(iterations=UNLIMITED))
+        return self.kernel(problem, Stop(iterations=UNLIMITED))
 
-    def ends_at_path_of(self, other: Self) -> bool:  # noqa: ARG002
+    def ends_like(self, other: Self) -> bool:  # noqa: ARG002
         """Whether these settings end the run at the path at which `other` settings ended it."""
         return True
 
@@ -179,4 +180,4 @@ class KernelPlanner(Planner):
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
     ) -> Iterator[Events]:
         """See `Planner.solve`."""
-        yield from KernelRun(self.loop(problem, stop), problem, rng, log).finish(stop)
+        yield from KernelRun(self.kernel(problem, stop), problem, rng, log).finish(stop)

@@ -1,1 +1,1 @@
-"""What follows planning: shortcut smoothing and execution in moves."""
+"""Steps after planning: shortcut smoothing and execution in moves."""

@@ -39,11 +39,8 @@ class Execute(Settings):
         if log.room < 2:
             yield log.drain()
         log.emit(Kind.PHASE, iteration, name=Phase.EXECUTE, status=Status.BEGIN)
-        place, cost, q = (
-            np.zeros(_execute.PLACES, np.int64),
-            np.zeros(1),
-            np.empty((1, path.shape[1])),
-        )
+        place, cost = np.zeros(_execute.PLACES, np.int64), np.zeros(1)
+        q = np.empty((1, path.shape[1]))
         while not stop.interrupted:
             log.tick()
             if _execute.follow(path, place, cost, q, space, log.buffer, iteration, self.max_move):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Stage, Status
 from brrt.kernels.event_log import EventLog
-from brrt.kernels.random import borrow, give_back
+from brrt.kernels.random import copy_state, restore_state
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing import _shortcut
 from brrt.settings import Settings, param
@@ -19,7 +19,7 @@ from brrt.settings import Settings, param
 class Shortcut(Settings):
     """Pick two waypoints at random; replace those between by a direct motion if it is free.
 
-    The cost never rises and the ends never move.
+    The cost never increases, and start and goal do not change.
     """
 
     attempts: int = param(100, "pairs to try", low=0)
@@ -46,7 +46,7 @@ class Shortcut(Settings):
         if log.room < 3:
             yield log.drain()
         log.emit(Kind.PHASE, iteration, name=Phase.SMOOTH, status=Status.BEGIN)
-        draws = borrow(rng)
+        draws = copy_state(rng)
         points, counts, cost = path.copy(), np.array([len(path), 0]), np.zeros(1)
         while True:
             log.tick()
@@ -58,7 +58,7 @@ class Shortcut(Settings):
                 yield log.drain()
             if stop.interrupted or made >= self.attempts or waypoints <= 2:
                 break
-        give_back(draws, rng)
+        restore_state(draws, rng)
         log.emit(
             Kind.PATH,
             iteration,
