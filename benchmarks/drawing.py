@@ -18,7 +18,7 @@ import rerun as rr
 
 from brrt import Events, Memory, Run, Scenario
 from brrt.events import FIELDS
-from brrt.views.rerun.arrow import to_arrow
+from brrt.formats.rrd.columns import to_arrow
 from brrt.views.rerun.sink import RerunSink
 
 RUNS: dict[str, dict[str, Any]] = {

@@ -1,19 +1,20 @@
-"""Kill runs while they record, and spoil recordings: what is left, and what does a reader say?
+"""Kill runs while they record, and damage recordings: what is left, and what a reader says of it.
 
     python benchmarks/faults.py [--kills 200] [--copies 2000] [--seed 0] [--first 0]
 
 Kills: a run that records at full speed into both files is killed (SIGKILL) at a random moment. It
-notes how many events it has handed over, and the time of the last. Of each file that is left, the
-events must be those of the other file as far as they go, of what was handed over at most a second
-or a chunk may be missing, and `brrt recover` must make a file of them that `brrt verify` and stock
-mcap take.
+notes how many events it has handed over, and the time of the last. The .mcap must have them but
+for at most a second or a chunk, and `brrt recover` must make a file of them that `brrt verify` and
+stock mcap take. The .rrd must be refused with a line that names the .mcap.
 
-Copies: bytes are flipped, blocks swapped, doubled, blanked or cut off, in files of runs that ended
-and of runs that were killed. Each copy must read as the original does, or as the beginning of it
-and an error of one line, within 5 seconds. Exit code 1 if anything else happens.
+Copies: bytes are flipped, blocks swapped, doubled, blanked or cut off, in .mcap files of runs that
+ended and of runs that were killed. Each copy must read as the original does, or as the beginning
+of it and an error of one line, within 5 seconds. Copies of .rrd files are cut alone: other damage
+may end the process (see docs), and they have no checksums.
 
-Each kill and each copy is drawn by its own number, so that `--first 120` goes on where a run of
-this script was stopped. What is found is printed at once; how far it is, on stderr.
+The exit code is 1 if anything else happens. Each kill and each copy is drawn by its own number, so
+that `--first 120` goes on where a run of this script was stopped. Findings are printed at once,
+progress on stderr.
 """
 
 import argparse
@@ -27,7 +28,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -37,7 +38,7 @@ from typing import IO, Any, cast
 from mcap.reader import make_reader
 
 from brrt import BrrtError, Events, McapSink, Run, Scenario, first_difference, read
-from brrt.formats.background import Background
+from brrt.formats.background import BackgroundSink
 from brrt.formats.recover import recover
 from brrt.replay.metrics import Metrics
 from brrt.views.rerun.sink import RerunSink
@@ -52,7 +53,8 @@ SMALL = (
 )
 PATIENCE_S = 5.0
 LOSS_S, CHUNK = 1.0, 1 << 16
-TELLS, INTERRUPTED = 20, 130
+WAYS = ("flip", "flip", "flip", "cut", "swap", "blank", "double")
+REPORTS, INTERRUPTED = 20, 130
 MEMORY = 6 << 30
 
 
@@ -61,8 +63,8 @@ def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
     run = Run(scenario, batch=batch)
     world = run.problem.world
     sinks = [
-        Background(McapSink(folder / NAMES[0], run.manifest, world)),
-        Background(RerunSink(run.manifest, world, path=folder / NAMES[1])),
+        BackgroundSink(McapSink(folder / NAMES[0], run.manifest, world)),
+        BackgroundSink(RerunSink(run.manifest, world, path=folder / NAMES[1])),
     ]
     handed = os.open(folder / "handed", os.O_WRONLY | os.O_CREAT)
     count = 0
@@ -78,8 +80,8 @@ def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
     os.close(handed)
 
 
-def nursery() -> None:
-    """Fork a run for each folder that is asked for: to import and compile takes long."""
+def fork_runs() -> None:
+    """Fork a run for each folder on stdin: importing and compiling takes long."""
     Run(ENDLESS)
     for line in sys.stdin:
         child = os.fork()
@@ -87,7 +89,7 @@ def nursery() -> None:
             try:
                 record(ENDLESS, Path(line.strip()))
             finally:
-                os._exit(1)  # it is to be killed; what it says now nobody may take for us
+                os._exit(1)  # it is to be killed; it must not answer in our name
         print(child, flush=True)
         os.waitpid(child, 0)
         print("gone", flush=True)
@@ -110,7 +112,7 @@ def saved(path: Path) -> tuple[Events | None, str | None]:
 
 
 def command(*args: object) -> tuple[int, str]:
-    """Run `brrt` in this process; return its exit code and what it said."""
+    """Run `brrt` in this process; return its exit code and its output."""
     (script,) = entry_points(group="console_scripts", name="brrt")
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -124,41 +126,33 @@ def command(*args: object) -> tuple[int, str]:
 
 
 def judge_kill(folder: Path, figures: Counter[str]) -> list[str]:
-    """Say what is wrong with the files that a killed run left."""
+    """Return what is wrong with the files that a killed run left."""
     note = folder / "handed"
     words = note.read_text().split() if note.exists() else []
     handed, t = (int(words[0]), int(words[1])) if words else (0, 0)
-    wrong, logs = [], []
-    for name in NAMES:
-        path = folder / name
-        if not path.exists():
-            if handed:
-                wrong.append(f"{name} is not there, though {handed:,} events were handed over")
-            continue
-        events, _ = saved(path)
-        if events is None:
-            wrong.append(f"{name} cannot be read: {saved(path)[1]}")
-            continue
-        logs.append(events)
-        lost = max(0.0, (t - events.last.t) / 1e9)
-        figures[f"{name}: events lost"] += max(0, handed - len(events))
-        figures[f"{name}: most seconds lost, ms"] = max(
-            figures[f"{name}: most seconds lost, ms"], round(1e3 * lost)
-        )
-        if lost > LOSS_S and handed - len(events) > CHUNK:
-            wrong.append(f"{name} lacks the last {lost:.2f} s, {handed - len(events):,} events")
-        wrong += judge_recovery(path, events)
-    if len(logs) == 2:
-        common = min(map(len, logs)) - 1
-        if first_difference([logs[0].until(seq=common)], [logs[1].until(seq=common)]):
-            wrong.append("the two files differ")
     figures["events handed over"] += handed
-    return wrong
+    mcap, rrd = (folder / name for name in NAMES)
+    wrong = []
+    if rrd.exists():
+        events, said = saved(rrd)
+        if events is not None or not str(said).endswith("is cut; replay the .mcap of the run"):
+            wrong.append(f"{rrd.name} is not refused as cut: {said}")
+    if not mcap.exists():
+        return [*wrong, f"no {mcap.name} after {handed:,} events"] if handed else wrong
+    events, said = saved(mcap)
+    if events is None:
+        return [*wrong, f"{mcap.name} cannot be read: {said}"]
+    lost, lost_s = max(0, handed - len(events)), max(0.0, (t - events.last.t) / 1e9)
+    figures["events lost"] += lost
+    figures["most time lost, ms"] = max(figures["most time lost, ms"], round(1e3 * lost_s))
+    if lost_s > LOSS_S and lost > CHUNK:
+        wrong.append(f"{mcap.name} lacks the last {lost_s:.2f} s, {lost:,} events")
+    return wrong + judge_recovery(mcap, events)
 
 
 def judge_recovery(path: Path, events: Events) -> list[str]:
-    """Recover a file and say what is wrong with the result."""
-    whole = path.with_name(f"whole{path.suffix}")
+    """Recover a file; return what is wrong with the new one."""
+    whole = path.with_name("whole.mcap")
     found = recover(path, whole)
     back, error = saved(whole)
     wrong = [] if found.events == len(events) else [f"{found.events} of {len(events)} recovered"]
@@ -169,13 +163,12 @@ def judge_recovery(path: Path, events: Events) -> list[str]:
             code, said = command(*args)
             if code:
                 wrong.append(f"brrt {args[0]} {args[1].name}: exit code {code}: {said[-200:]}")
-    if path.suffix == ".mcap":
-        with whole.open("rb") as file:
-            summary = make_reader(file, validate_crcs=True).get_summary()
-        if summary is None or summary.statistics is None:
-            return [*wrong, "stock mcap finds no summary"]
-        if summary.statistics.message_count != len(events):
-            wrong.append("stock mcap counts otherwise")
+    with whole.open("rb") as file:
+        summary = make_reader(file, validate_crcs=True).get_summary()
+    if summary is None or summary.statistics is None:
+        return [*wrong, "stock mcap finds no summary"]
+    if summary.statistics.message_count != len(events):
+        wrong.append("stock mcap counts otherwise")
     return wrong
 
 
@@ -187,10 +180,10 @@ def draws(seed: int, what: str, number: int) -> random.Random:
 def kills(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
     """Kill a run for each number; yield what is wrong with what they left."""
     with Popen(
-        [sys.executable, __file__, "--nursery"], stdin=PIPE, stdout=PIPE, text=True
+        [sys.executable, __file__, "--fork-runs"], stdin=PIPE, stdout=PIPE, text=True
     ) as process:
         orders, answers = cast("IO[str]", process.stdin), cast("IO[str]", process.stdout)
-        for number in told(numbers, "kills"):
+        for number in counted(numbers, "kills"):
             with tempfile.TemporaryDirectory() as name:
                 orders.write(f"{name}\n")
                 orders.flush()
@@ -204,9 +197,9 @@ def kills(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
         orders.close()
 
 
-def spoiled(data: bytes, rng: random.Random) -> tuple[str, bytes]:
-    """Damage a file in one of the ways that there are; say in which."""
-    way = rng.choice(["flip", "flip", "flip", "cut", "swap", "blank", "double"])
+def damaged(data: bytes, rng: random.Random, ways: Sequence[str]) -> tuple[str, bytes]:
+    """Damage a file in one of some ways; return in which."""
+    way = rng.choice(ways)
     at, size = rng.randrange(len(data)), rng.choice([1, 8, 100, 5000])
     if way == "flip":
         changed = bytearray(data)
@@ -229,7 +222,7 @@ def spoiled(data: bytes, rng: random.Random) -> tuple[str, bytes]:
 
 @dataclass
 class Original:
-    """A recording to be spoiled: its name, its bytes, its events and all else that it says."""
+    """A recording to damage: its name, its bytes, its events and all else that it says."""
 
     path: Path
     data: bytes
@@ -252,8 +245,10 @@ def head(path: Path) -> tuple[Any, ...]:
 
 
 def judge_copy(path: Path, original: Original) -> tuple[str, str | None]:
-    """Read a spoiled copy; say what became of it, and what is wrong with that."""
+    """Read a damaged copy; return what became of it, and what is wrong with that."""
     whole, (events, error) = original.events, saved(path)
+    if path.suffix == ".rrd":
+        return ("reported", None) if events is None else ("wrong", "a cut file is not refused")
     if events is not None:
         if first_difference([whole.until(seq=len(events) - 1)], [events]):
             return "wrong", "other events, and nothing said"
@@ -270,28 +265,28 @@ def judge_copy(path: Path, original: Original) -> tuple[str, str | None]:
 
 
 def originals(folder: Path, seed: int) -> list[Path]:
-    """Record some runs, in small batches; take the end off copies, as a kill does."""
+    """Record some runs, in small batches; cut the end off copies, as a kill does."""
     found = []
     for number, scenario in enumerate(SMALL):
         place = folder / str(number)
         place.mkdir()
         record(scenario, place, batch=250)
         rng = draws(seed, "original", number)
-        for name in NAMES:
-            data = (place / name).read_bytes()
-            killed = place / f"killed-{name}"
-            killed.write_bytes(data[: int(len(data) * rng.uniform(0.3, 0.9))])
-            found += [place / name, killed]
+        data = (place / NAMES[0]).read_bytes()
+        killed = place / f"killed-{NAMES[0]}"
+        killed.write_bytes(data[: int(len(data) * rng.uniform(0.3, 0.9))])
+        found += [*(place / name for name in NAMES), killed]
     return found
 
 
 def copies(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
-    """Spoil a copy for each number; yield what is wrong with how they read."""
+    """Damage a copy for each number; yield what is wrong with how they read."""
     with tempfile.TemporaryDirectory() as name:
         sources = [Original.of(path) for path in originals(Path(name), seed)]
-        for number in told(numbers, "copies"):
+        for number in counted(numbers, "copies"):
             source = sources[number % len(sources)]
-            way, data = spoiled(source.data, draws(seed, "copy", number))
+            ways = ["cut"] if source.path.suffix == ".rrd" else WAYS
+            way, data = damaged(source.data, draws(seed, "copy", number), ways)
             path = Path(name, f"copy{source.path.suffix}")
             path.write_bytes(data)
             began = time.perf_counter()
@@ -314,13 +309,13 @@ def copies(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
                 yield f"copy {number} ({way} of {source.path.name}): {wrong}; see {keep}"
 
 
-def told(numbers: range, what: str) -> Iterator[int]:
-    """Yield the numbers; say on stderr how far it is, and how to go on once it was stopped."""
+def counted(numbers: range, what: str) -> Iterator[int]:
+    """Yield the numbers; report progress on stderr, and how to go on after an interrupt."""
     began = time.perf_counter()
     for number in numbers:
         done = number - numbers.start
         last = number == numbers.stop - 1
-        if sys.stderr.isatty() or done % max(1, len(numbers) // TELLS) == 0 or last:
+        if sys.stderr.isatty() or done % max(1, len(numbers) // REPORTS) == 0 or last:
             passed = time.perf_counter() - began
             left = f", {passed / done * (len(numbers) - done):.0f} s left" if done else ""
             line = f"{what}: {number:,} of {numbers.stop:,} after {passed:.0f} s{left}"
@@ -334,8 +329,8 @@ def told(numbers: range, what: str) -> Iterator[int]:
             raise
 
 
-def look_at(what: Callable[..., Iterator[str]], numbers: range, seed: int) -> int:
-    """Print each finding as it comes, then the figures, also where it was stopped; count them."""
+def run_all(what: Callable[..., Iterator[str]], numbers: range, seed: int) -> int:
+    """Print each finding as it comes, then the figures, even if interrupted; count them."""
     figures: Counter[str] = Counter()
     findings, began = 0, time.perf_counter()
     try:
@@ -352,7 +347,7 @@ def look_at(what: Callable[..., Iterator[str]], numbers: range, seed: int) -> in
 
 
 def bound_memory() -> None:
-    """Let a spoiled file take so much and no more; Rerun keeps threads for each file it wrote."""
+    """Bound what reading a damaged file takes; Rerun keeps threads for each file it wrote."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
@@ -367,11 +362,11 @@ def main() -> int:
     parser.add_argument("--copies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0, help="number of the first kill and copy")
-    parser.add_argument("--nursery", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--fork-runs", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
-    if args.nursery:
+    if args.fork_runs:
         with contextlib.suppress(KeyboardInterrupt):
-            nursery()
+            fork_runs()
         return 0
     findings = 0
     for what, count in ((kills, args.kills), (copies, args.copies)):
@@ -381,7 +376,7 @@ def main() -> int:
         if what is copies:
             bound_memory()
         try:
-            findings += look_at(what, numbers, args.seed)
+            findings += run_all(what, numbers, args.seed)
         except KeyboardInterrupt:
             return INTERRUPTED
     return int(bool(findings))

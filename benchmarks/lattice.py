@@ -18,7 +18,7 @@ import numpy as np
 
 from brrt import Events, McapSink, Memory, Run, Scenario
 from brrt.events import Kind
-from brrt.formats.background import Background
+from brrt.formats.background import BackgroundSink
 
 SIDE = 512
 ENDS = (Kind.PHASE, Kind.PATH)
@@ -81,7 +81,7 @@ def recorded(scenario: Scenario, folder: Path) -> tuple[Events, float, float]:
     run, memory = Run(scenario), Memory()
     path = folder / "run.mcap"
     path.unlink(missing_ok=True)
-    metrics = run.execute([Background(McapSink(path, run.manifest, run.problem.world)), memory])
+    metrics = run.execute([BackgroundSink(McapSink(path, run.manifest, run.problem.world)), memory])
     inside = 0
     for batch in memory.batches:
         # Those of the two ends are written by Python.

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from brrt import Events, Kind, McapSink, Problem, Run, Scenario, World, check, read
-from brrt.formats.background import Background
+from brrt.formats.background import BackgroundSink
 from brrt.recording import Result
 
 PEER = Path(__file__).with_name("ompl_peer.cpp")
@@ -150,7 +150,7 @@ class Bench:
         )  # fmt: skip
         run, kept = Run(scenario), Paths()
         file = McapSink(self.folder / "run.mcap", run.manifest, run.problem.world)
-        figures = run.execute([Background(file), kept]).as_dict()
+        figures = run.execute([BackgroundSink(file), kept]).as_dict()
         return figures, kept
 
     def solve_ms(self, case: Case, seed: int, planner: str, **settings: Any) -> float:

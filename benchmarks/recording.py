@@ -18,9 +18,8 @@ from mcap.writer import CompressionType, Writer
 
 from brrt.events import Events, Kind
 from brrt.formats import McapSink, read_mcap
-from brrt.formats.background import Background
-from brrt.formats.mcap.cdr import definition
-from brrt.formats.mcap.writer import channel_of
+from brrt.formats.background import BackgroundSink
+from brrt.formats.mcap.messages import channel_of, definition
 from brrt.recording import Memory, Sink
 from brrt.replay.metrics import metrics
 from brrt.runs.run import Run
@@ -85,12 +84,12 @@ def plan_seconds(events: int, folder: Path, kinds: tuple[str, ...]) -> tuple[flo
     sinks: list[Sink] = []
     if "mcap" in kinds:
         path = folder / "run.mcap"
-        sinks.append(Background(McapSink(path, run.manifest, run.problem.world)))
+        sinks.append(BackgroundSink(McapSink(path, run.manifest, run.problem.world)))
     if "rrd" in kinds:
         from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - optional here
 
         path = folder / "run.rrd"
-        sinks.append(Background(RerunSink(run.manifest, run.problem.world, path=path)))
+        sinks.append(BackgroundSink(RerunSink(run.manifest, run.problem.world, path=path)))
     began = time.perf_counter()
     metrics = run.execute(sinks)
     return time.perf_counter() - began, int(metrics.as_dict()["events"])

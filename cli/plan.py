@@ -259,15 +259,15 @@ def _params(texts: list[str]) -> dict[str, str]:
 
 def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> list["Sink"]:
     from brrt.formats import McapSink  # noqa: PLC0415
-    from brrt.formats.background import Background  # noqa: PLC0415
+    from brrt.formats.background import BackgroundSink  # noqa: PLC0415
 
     world, sinks = run.problem.world, list["Sink"]()
     if mcap is not None:
-        sinks.append(Background(McapSink(mcap, run.manifest, world)))
+        sinks.append(BackgroundSink(McapSink(mcap, run.manifest, world)))
     if rrd is not None or view:
         from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
 
-        sinks.append(Background(RerunSink(run.manifest, world, path=rrd, view=view)))
+        sinks.append(BackgroundSink(RerunSink(run.manifest, world, path=rrd, view=view)))
     return sinks
 
 

@@ -12,24 +12,23 @@ from .console import Code, out
 
 def recover(
     cut: Annotated[
-        Path, typer.Argument(help="A recording as it was left, .mcap or .rrd.", metavar="CUT")
+        Path, typer.Argument(help="A recording that was cut or damaged, .mcap.", metavar="CUT")
     ],
     whole: Annotated[
         Path,
-        typer.Option(
-            "--out", help="Write what is whole of it here, .mcap or .rrd.", metavar="WHOLE"
-        ),
+        typer.Option("--out", help="The new file, .mcap or .rrd.", metavar="WHOLE"),
     ],
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> None:
-    """Make a whole file of a recording that was cut or damaged: by a kill, a full disk, a fault.
+    """Save the events before the first damage of a recording that was cut or damaged.
 
-    Exit code 1: no event is whole, and the file holds the problem alone: world, start, goal and
-    settings.
+    A killed process, a full disk or a fault of the disk leaves such a file. The new one is whole:
+    it has index and checksums, and the result if the run came to its end. Exit code 1: no event
+    precedes the damage, and the new file holds only world, start, goal and settings.
+
+    An .rrd file must be whole; of one that is not, save the .mcap of the run.
 
     brrt recover cut.mcap --out whole.mcap
-
-    brrt recover cut.rrd --out whole.rrd
 
     brrt recover cut.mcap --out whole.rrd
     """

@@ -1,4 +1,4 @@
-"""Recordings: sinks that write them, and `read` for what they wrote."""
+"""Recordings in files: sinks that write them, and `read`, which reads them."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -10,67 +10,67 @@ from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events
 from brrt.files import is_there
 from brrt.formats.integrity import BrokenError, CutError, DamagedError
-from brrt.formats.mcap.container import MAGIC
 from brrt.formats.mcap.reader import is_whole, read_mcap
-from brrt.formats.mcap.writer import McapSink
+from brrt.formats.mcap.records import MAGIC
+from brrt.formats.mcap.sink import McapSink
 from brrt.recording import Recording
-
-_RRD = b"RRF"
 
 
 def read(path: Path | str, *, partial: bool = False) -> Recording:
-    """Open a recording, MCAP or Rerun, told apart by how the file begins.
+    """Open a recording, MCAP or Rerun, whatever its name.
 
     Args:
         path: The file.
-        partial: Take what is whole of a file that was cut or damaged; otherwise `CutError` or
-            `DamagedError` is raised where that is met. A recording whose `result` is None ends
-            ahead of its run's end.
+        partial: Take the events that precede a cut or the first damage of an MCAP file; otherwise
+            the batches raise `CutError` or `DamagedError` there. A recording whose `result` is None
+            ends before its run did.
 
     Raises:
-        RecordingError: The file cannot be read, or is not a recording of brrt.
+        RecordingError: The file cannot be read, or is not a recording of brrt, or is a Rerun file
+            that is cut or damaged.
     """
-    recording = _opened(path)
+    try:
+        path = Path(path)
+    except TypeError:
+        raise BrrtError(f"read takes the name of a file, not {type(path).__name__}") from None
+    begin = _first_bytes(path)
+    if begin.startswith(b"RRF"):
+        from brrt.formats.rrd.reader import read_rrd  # noqa: PLC0415 - imports rerun
+
+        return replace(read_rrd(path), name=path.name)
+    if begin != MAGIC:
+        raise RecordingError(
+            f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote"
+        )
+    recording = replace(read_mcap(path), name=path.name)
     if not partial:
         return recording
-    if recording.result is not None and not _is_whole(Path(path)):
+    if (recording.result or recording.counts) and not is_whole(path):
         recording = replace(recording, result=None, counts=None)
-    return replace(recording, batches=bound(_whole_part, recording.batches))
+    return replace(recording, batches=bound(_until_damage, recording.batches))
 
 
-def _is_whole(path: Path) -> bool:
-    """Whether no event is lost of a file that has an end; an .rrd has none if that is not so."""
-    with path.open("rb") as file:
-        return file.read(len(_RRD)) == _RRD or is_whole(path)
+def _first_bytes(path: Path) -> bytes:
+    """Read how a file begins.
 
-
-def _whole_part(batches: Callable[[], Iterable[Events]]) -> Iterator[Events]:
-    """Yield the events that stand ahead of a cut or of damage."""
-    with suppress(BrokenError):
-        yield from batches()
-
-
-def _opened(given: Path | str) -> Recording:
-    try:
-        path = Path(given)
-    except TypeError:
-        raise BrrtError(f"read takes the name of a file, not {type(given).__name__}") from None
+    Raises:
+        RecordingError: It is not a file, or cannot be read.
+    """
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: is a folder; name a recording in it, .mcap or .rrd")
         if not path.is_file() and is_there(path):
-            raise RecordingError(f"{path}: no file but a pipe or a device; save it to a file first")
+            raise RecordingError(f"{path}: a pipe or a device; save it to a file first")
         with path.open("rb") as file:
-            begin = file.read(len(MAGIC))
+            return file.read(len(MAGIC))
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
-    if begin == MAGIC:
-        return replace(read_mcap(path), name=path.name)
-    if begin.startswith(_RRD):
-        from brrt.formats.rrd.reader import read_rerun  # noqa: PLC0415 - pyarrow is slow to load
 
-        return replace(read_rerun(path), name=path.name)
-    raise RecordingError(f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote")
+
+def _until_damage(batches: Callable[[], Iterable[Events]]) -> Iterator[Events]:
+    """Yield the events that precede a cut or the first damage."""
+    with suppress(BrokenError):
+        yield from batches()
 
 
 __all__ = [

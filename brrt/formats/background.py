@@ -1,4 +1,4 @@
-"""Write while planning: a sink on a thread of its own."""
+"""A sink on a thread of its own, so that the planner goes on while files are written."""
 
 import queue
 import threading
@@ -7,16 +7,14 @@ from brrt.events import Events
 from brrt.recording import Result, Sink
 
 _BATCHES = 24
-"""Batches in waiting, half a megabyte each: so far a planner may be ahead before it waits."""
+"""Batches that may wait, half a megabyte each, before the planner waits too."""
 
 _IDLE_S = 0.1
-"""After so long without a batch the sink gets an empty one, to look at what it holds back."""
+"""After so long without a batch the sink gets an empty one, to write what it has buffered."""
 
 
-class Background:
+class BackgroundSink:
     """Hands batches to another sink on a thread; kernels run without the GIL meanwhile.
-
-    While no batch comes, the sink is asked all the same whether it is time to write what it holds.
 
     What the sink raises is raised again by the next call here.
 
@@ -50,7 +48,7 @@ class Background:
 
     def _work(self) -> None:
         while (events := self._next()) is not None:
-            if not self._failed:  # a batch behind one that is missing is of no use
+            if not self._failed:  # events after missing ones cannot be replayed
                 try:
                     self._sink.write(events)
                 except BaseException as error:  # noqa: BLE001 - raised again on the caller's thread

@@ -1,17 +1,17 @@
-"""Small batches gathered into large ones, which cost less to write, but not for long."""
+"""Join small batches into large ones, which cost less to write, within a time limit."""
 
 import time
 
 from brrt.events import Events
 
 
-class Gathering:
-    """Holds batches back until it pays to write them, or until the first has waited enough.
+class Batching:
+    """Collects batches until there are enough events, or the first has waited long enough.
 
     Args:
         dof: Numbers in a configuration.
-        events: So many are enough.
-        seconds: So long an event may wait.
+        events: How many events are enough.
+        seconds: How long an event may wait.
     """
 
     def __init__(self, dof: int, events: int, seconds: float) -> None:
@@ -30,7 +30,7 @@ class Gathering:
         return self.take() if late or sum(map(len, self._batches)) >= self._enough else None
 
     def take(self) -> Events | None:
-        """Return all that wait as one batch; None if nothing does."""
+        """Return all waiting events as one batch; None if there are none."""
         batches, self._batches = self._batches, []
         if len(batches) > 1:
             return Events.concat(self._dof, batches)

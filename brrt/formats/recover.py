@@ -1,4 +1,4 @@
-"""A whole file out of one that was cut or damaged."""
+"""Write the events that precede a cut or damage into a new, whole file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,23 +8,23 @@ from brrt.errors import BrrtError, WriteError
 from brrt.files import replacing
 from brrt.formats import read
 from brrt.formats.integrity import BrokenError
-from brrt.formats.mcap.writer import McapSink
+from brrt.formats.mcap.sink import McapSink
 from brrt.recording import Recording
 from brrt.replay.metrics import Metrics
 
 NOTE = "brrt.recovered"
-"""Name of what a recovered file says of its origin."""
+"""Name of the texts in which a recovered file names its origin."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What was saved.
+    """What was recovered.
 
     Attributes:
-        events: How many.
+        events: How many events.
         until_s: When the last of them happened, in seconds of the run.
         lost: What is wrong with the file; None if it is whole.
-        complete: Whether those are all events, so that only what stands beside them was lost.
+        complete: Whether those are all events, so that the damage is behind or beside them.
         ended: Whether, besides, the run came to its own end.
     """
 
@@ -36,17 +36,17 @@ class Recovery:
 
 
 def recover(cut: Path | str, whole: Path | str) -> Recovery:
-    """Write what is sound of a recording into a new file, which lacks nothing that a file has.
+    """Write the events that precede a cut or the first damage into a new, whole file.
 
-    Index, statistics and checksums are made anew. The run's figures are written where the run came
-    to its end; otherwise the file says what it was made of (`NOTE`).
+    Index, statistics and checksums are made anew. The run's result is computed and written if the
+    run came to its end; otherwise the file names its origin (`NOTE`).
 
     Args:
-        cut: The recording, .mcap or .rrd, as it was left.
-        whole: The new file, .mcap or .rrd; it is there once it is complete.
+        cut: The recording: an .mcap file in any state, or an .rrd file that is whole.
+        whole: The new file, .mcap or .rrd; it appears once it is complete.
 
     Raises:
-        RecordingError: The recording cannot be read, or nothing of it is sound.
+        RecordingError: The recording cannot be read, or is cut or damaged before its first event.
         BrrtError: The new file cannot be written.
     """
     cut, whole = Path(cut), Path(whole)
@@ -55,15 +55,14 @@ def recover(cut: Path | str, whole: Path | str) -> Recovery:
     recording = read(cut)
     with replacing(whole) as unfinished:
         try:
-            recovery = _rewrite(cut, recording, unfinished)
+            return _rewrite(cut, recording, unfinished)
         except WriteError as error:
             why = f"{error.reason}; nothing of it is left: name a file where there is more room"
             raise WriteError(whole, why) from None
-    return recovery
 
 
 def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
-    """Write what is sound of a recording to a path."""
+    """Write what can be read of a recording to a path."""
     sink, metrics = _sink(path, recording), Metrics(recording.manifest)
     try:
         recovery = _copy(recording, sink, metrics)
@@ -78,26 +77,23 @@ def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
 
 def _sink(path: Path, recording: Recording) -> Any:
     if path.suffix == ".rrd":
-        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
+        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - imports rerun
 
         return RerunSink(recording.manifest, recording.world, path=path)
     return McapSink(path, recording.manifest, recording.world)
 
 
 def _copy(recording: Recording, sink: Any, metrics: Metrics) -> Recovery:
-    """Hand a sink the events as far as they are sound."""
+    """Hand the events to a sink, up to the end or the first damage."""
     count, last = 0, 0
-    batches = iter(recording.batches())
-    while True:
-        try:
-            batch = next(batches, None)
-        except BrokenError as error:
-            return Recovery(count, last / 1e9, error.fault, error.complete, error.ended)
-        if batch is None:
-            return Recovery(count, last / 1e9, None, True, recording.result is not None)
-        sink.write(batch)
-        metrics.write(batch)
-        count, last = count + len(batch), max(last, batch.last.t)
+    try:
+        for batch in recording.batches():
+            sink.write(batch)
+            metrics.write(batch)
+            count, last = count + len(batch), max(last, batch.last.t)
+    except BrokenError as error:
+        return Recovery(count, last / 1e9, error.fault, error.complete, error.ended)
+    return Recovery(count, last / 1e9, None, True, recording.result is not None)
 
 
 def _note(cut: Path, recovery: Recovery) -> dict[str, str]:

@@ -12,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 
 from brrt import McapSink, Memory, Run, Scenario, check, first_difference, read
-from brrt.formats.background import Background
+from brrt.formats.background import BackgroundSink
 from brrt.runs.branch import BranchedRun
 from brrt.views.rerun.sink import RerunSink
 from tests.conftest import Result
@@ -38,8 +38,8 @@ def test_wall_clock_that_jumps(name: str, tmp_path: Path, monkeypatch: pytest.Mo
     run = Run(Scenario(world="circles2d:n=40", seed=7), batch=50)
     paths, world, memory = [tmp_path / "x.mcap", tmp_path / "x.rrd"], run.problem.world, Memory()
     run.execute([
-        memory, Background(McapSink(paths[0], run.manifest, world)),
-        Background(RerunSink(run.manifest, world, path=paths[1])),
+        memory, BackgroundSink(McapSink(paths[0], run.manifest, world)),
+        BackgroundSink(RerunSink(run.manifest, world, path=paths[1])),
     ])  # fmt: skip
     log, epoch = memory.events(), run.manifest.epoch_ns
     assert check(run.manifest, world, log) == []

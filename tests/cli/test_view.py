@@ -105,7 +105,7 @@ def test_two_runs_show_where_they_part(brrt: Callable[..., Result], tmp_path: Pa
     [
         (["none.mcap"], "none.mcap: No such file or directory"),
         (["text.mcap"], "text.mcap: not a recording"),
-        (["cut.rrd", "--screenshot", "x.png"], "cut.rrd: the file is cut at byte"),
+        (["cut.rrd", "--screenshot", "x.png"], "cut.rrd: is cut; replay the .mcap of the run"),
         (["cut.mcap", "--screenshot", "x.png"], "take the problem with --partial"),
         (["a", "b", "c"], "one run, or two side by side, not 3"),
         (["run.mcap", "--screenshot", "no/x.png"], "there is no folder no"),

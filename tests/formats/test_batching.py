@@ -1,4 +1,4 @@
-"""Batches that are held back: all come out again, in order, and in time."""
+"""Batches that wait and sinks on a thread: all comes out, in order, and in time."""
 
 import time
 from itertools import pairwise
@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrt import Events, Kind
+from brrt import Events, Kind, RecordingError, Run, Scenario
 from brrt.events import table_dtype
-from brrt.formats.background import Background
-from brrt.formats.batching import Gathering
+from brrt.formats.background import BackgroundSink
+from brrt.formats.batching import Batching
 from brrt.recording import Result
 
 NOTHING = Events(0, {})
@@ -42,7 +42,7 @@ def test_nothing_is_lost_or_late(
     out: list[Events] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("brrt.formats.batching.time.monotonic", lambda: now)
-        held = Gathering(2, enough, patience)
+        held = Batching(2, enough, patience)
         for count, pause in arrivals:
             now += pause
             born += [now] * count
@@ -67,12 +67,12 @@ def test_nothing_is_lost_or_late(
     assert (first, len(kinds)) == (0, len(born))
 
 
-def test_nothing_waits_for_a_planner_that_thinks() -> None:
-    """A sink in the background gets to look at the clock while no batch comes."""
+def test_nothing_waits_for_a_slow_planner() -> None:
+    """A sink in the background is asked to write what it has while no batch comes."""
     out: list[Events] = []
 
     class Sink:
-        held = Gathering(2, 1000, 0.3)
+        held = Batching(2, 1000, 0.3)
 
         def write(self, events: Events) -> None:
             due = self.held.add(events)
@@ -81,10 +81,42 @@ def test_nothing_waits_for_a_planner_that_thinks() -> None:
         def close(self, result: Result | None) -> None:
             assert result is not None
 
-    background = Background(Sink())
+    background = BackgroundSink(Sink())
     background.write(batch(0, 5))
     end = time.monotonic() + 10
     while not out and time.monotonic() < end:
         time.sleep(0.01)
     background.close({})
     assert [len(each) for each in out] == [5]
+
+
+class FailingSink:
+    """Fails at its second batch.
+
+    Args:
+        error: What it raises.
+    """
+
+    def __init__(self, error: BaseException) -> None:
+        self.error, self.sizes, self.closed = error, list[int](), False
+
+    def write(self, events: Events) -> None:
+        """Note the size of the batch."""
+        self.sizes.append(len(events))
+        if len(self.sizes) == 2:
+            raise self.error
+
+    def close(self, result: Result | None) -> None:
+        """See that no result is written after missing events."""
+        self.closed = True
+        assert result is None
+
+
+@pytest.mark.parametrize("error", [MemoryError("too much"), RecordingError("broken")])
+def test_an_error_reaches_the_planner(error: BaseException) -> None:
+    """What a sink raises on its thread ends the run; batches after that one are left out."""
+    sink, run = FailingSink(error), Run(Scenario(world="circles2d:n=40", seed=3), batch=20)
+    with pytest.raises(type(error), match=str(error)):
+        run.execute([BackgroundSink(sink)])
+    assert sink.closed
+    assert len(sink.sizes) == 2

@@ -1,4 +1,4 @@
-"""Values that no planner can mean are refused as a recording is read."""
+"""Values that no planner can mean, and gaps, are refused as a recording is read."""
 
 from typing import Any
 
@@ -7,6 +7,7 @@ import pytest
 
 from brrt import BrrtError, Events, Kind, Memory, Run, Scenario
 from brrt.formats.integrity import Numbering
+from tests.support.files import part
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +38,8 @@ def _take(events: Events, kind: Kind, name: str, value: Any) -> None:
     Numbering().take(Events(events.dof, tables))
 
 
-def test_sound_logs_pass(rrt: Events, lrta: Events) -> None:
-    """What planners write is sound; so is an estimate without an end."""
+def test_logs_of_planners_pass(rrt: Events, lrta: Events) -> None:
+    """What planners write is possible; so is an infinite estimate."""
     Numbering().take(rrt)
     Numbering().take(lrta)
     _take(lrta, Kind.HEURISTIC, "h", np.inf)  # a cell without a way out
@@ -72,3 +73,23 @@ def test_impossible_estimate(lrta: Events) -> None:
     """Infinite is an estimate, not a number is none."""
     with pytest.raises(BrrtError, match="heuristic has h = nan"):
         _take(lrta, Kind.HEURISTIC, "h", np.nan)
+
+
+def test_gaps_and_doubles(rrt: Events) -> None:
+    """Every number is there once, in order; a batch that is refused does not count."""
+    numbering = Numbering()
+    for batch, message in (
+        (rrt.until(seq=20), None),
+        (part(rrt, 22, 40), "events are missing"),
+        (rrt.until(seq=20), "events are missing"),
+        (part(rrt, 21, 40), None),
+    ):
+        if message is None:
+            numbering.take(batch)
+            continue
+        with pytest.raises(BrrtError, match=message):
+            numbering.take(batch)
+    assert numbering.next == 40
+    tables = {kind: np.concatenate([t, t[-1:]]) for kind, t in part(rrt, 40, 60).tables.items()}
+    with pytest.raises(BrrtError, match=r"out of order|missing"):
+        numbering.take(Events(rrt.dof, tables))

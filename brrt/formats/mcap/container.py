@@ -1,7 +1,9 @@
-"""MCAP files chunk by chunk: whatever is no message, every index, and every checksum."""
+"""Write MCAP files: chunks of messages, texts, indexes and the summary, all with checksums."""
 
 import struct
 import zlib
+from collections import Counter
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,10 +16,17 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from brrt.files import OutputFile
+from brrt.formats.mcap.records import FOOTER_BYTES, INDEX_ENTRY, MAGIC
 
-MAGIC = b"\x89MCAP0\r\n"
-
-_INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
+_SUMMARY = {
+    records.Schema: Opcode.SCHEMA,
+    records.Channel: Opcode.CHANNEL,
+    records.Statistics: Opcode.STATISTICS,
+    records.ChunkIndex: Opcode.CHUNK_INDEX,
+    records.AttachmentIndex: Opcode.ATTACHMENT_INDEX,
+    records.MetadataIndex: Opcode.METADATA_INDEX,
+}
+"""What the summary consists of, in this order."""
 
 
 class Container:
@@ -34,8 +43,9 @@ class Container:
     def __init__(self, path: Path, library: str, level: int = 1) -> None:
         self._compressor = zstandard.ZstdCompressor(level=level)
         self._position, self._crc = 0, 0
-        self._index = _Summary()
-        self._prefix = b""
+        self._summary: dict[type, list[Any]] = {kind: [] for kind in _SUMMARY}
+        self._counts: Counter[int] = Counter()
+        self._declarations = b""
         self._file = OutputFile(path)
         self._waiting: list[bytes] = []
         self._written = 0
@@ -49,11 +59,9 @@ class Container:
 
     def declare(self, *declared: records.Schema | records.Channel) -> None:
         """Declare schemas and channels before the first chunk that needs them."""
-        builder = RecordBuilder()
+        self._declarations += _to_bytes(*declared)
         for record in declared:
-            record.write(builder)
-        self._prefix += builder.end()
-        self._index.declare(*declared)
+            self._summary[type(record)].append(record)
 
     def chunk(
         self,
@@ -62,82 +70,89 @@ class Container:
         channels: NDArray[np.unsignedinteger[Any]],
         offsets: NDArray[np.uint64],
     ) -> None:
-        """Write a chunk with its message indexes, as far as the disk.
+        """Write a chunk with its message indexes, and hand it to the operating system.
 
         Args:
             raw: Message records, at least one.
-            times: Their log times, none before the one ahead of it, shape (n,).
+            times: Their log times, which never fall, shape (n,).
             channels: Their channels, shape (n,).
             offsets: Where they begin, shape (n,).
         """
-        if self._prefix:
-            raw, offsets = self._prefix + raw, offsets + np.uint64(len(self._prefix))
-            self._prefix = b""
+        raw, offsets = self._declarations + raw, offsets + np.uint64(len(self._declarations))
+        self._declarations = b""
         low, high = int(times[0]), int(times[-1])
         data = self._compressor.compress(raw)
-        chunk = records.Chunk("zstd", data, high, low, zlib.crc32(raw), len(raw))
-        start, length = self._record(chunk)
-        index_offsets, begin = {}, self._position
+        start, length = self._record(
+            records.Chunk("zstd", data, high, low, zlib.crc32(raw), len(raw))
+        )
+        indexes, begin = {}, self._position
         counts = np.bincount(channels)
-        for channel in np.flatnonzero(counts):
-            mine = channels == channel
-            entries = np.empty(int(counts[channel]), _INDEX)
-            entries["log_time"], entries["offset"] = times[mine], offsets[mine]
-            index_offsets[int(channel)] = self._position
-            # opcode MessageIndex, length, channel, bytes of entries
-            head = struct.pack("<BQHI", 7, 6 + entries.nbytes, channel, entries.nbytes)
+        for channel in map(int, np.flatnonzero(counts)):
+            of_channel = channels == channel
+            entries = np.empty(int(counts[channel]), INDEX_ENTRY)
+            entries["log_time"], entries["offset"] = times[of_channel], offsets[of_channel]
+            indexes[channel] = self._position
+            self._counts[channel] += len(entries)
+            size = entries.nbytes
+            head = struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + size, channel, size)
             self._write(head + entries.tobytes())
-        self._index.add_chunk(
+        self._summary[records.ChunkIndex].append(
             records.ChunkIndex(
-                length,
-                start,
-                "zstd",
-                len(data),
-                high,
-                self._position - begin,
-                index_offsets,
-                low,
-                len(raw),
-            ),
-            {int(c): int(counts[c]) for c in np.flatnonzero(counts)},
+                chunk_length=length,
+                chunk_start_offset=start,
+                compression="zstd",
+                compressed_size=len(data),
+                message_end_time=high,
+                message_index_length=self._position - begin,
+                message_index_offsets=indexes,
+                message_start_time=low,
+                uncompressed_size=len(raw),
+            )
         )
         self.flush()
 
-    def metadata(self, name: str, texts: dict[str, str]) -> None:
+    def metadata(self, name: str, texts: Mapping[str, str]) -> None:
         """Write named texts."""
-        start, length = self._record(records.Metadata(name, texts))
-        self._index.metadata.append(records.MetadataIndex(start, length, name))
+        start, length = self._record(records.Metadata(name, dict(texts)))
+        self._summary[records.MetadataIndex].append(records.MetadataIndex(start, length, name))
 
     def attach(self, name: str, data: bytes, at_ns: int) -> None:
         """Write an attachment in JSON."""
         kind = "application/json"
-        attachment = records.Attachment(
-            create_time=at_ns, log_time=at_ns, name=name, media_type=kind, data=data
+        start, length = self._record(
+            records.Attachment(
+                create_time=at_ns, log_time=at_ns, name=name, media_type=kind, data=data
+            )
         )
-        start, length = self._record(attachment)
-        self._index.attachments.append(
+        self._summary[records.AttachmentIndex].append(
             records.AttachmentIndex(start, length, at_ns, at_ns, len(data), name, kind)
         )
 
     def finish(self) -> None:
         """Write the end of the data section, the summary and the footer."""
         self._record(records.DataEnd(self._crc))
-        start = self._position
-        summary, offsets_at = self._index.build(start)
-        # opcode Footer, length, start of the summary, start of its offsets: all under the CRC
-        crc = zlib.crc32(
-            struct.pack("<BQQQ", Opcode.FOOTER, 20, start, offsets_at), zlib.crc32(summary)
-        )
+        self._summary[records.Statistics] = [self._statistics()]
+        start, offsets = self._position, list[records.SummaryOffset]()
+        summary = b""
+        for kind, opcode in _SUMMARY.items():
+            group = _to_bytes(*self._summary[kind])
+            if group:
+                offsets.append(records.SummaryOffset(opcode, start + len(summary), len(group)))
+            summary += group
+        offsets_at = start + len(summary)
+        summary += _to_bytes(*offsets)
+        # Opcode, length, start of the summary and start of its offsets are under the CRC too.
+        footer = struct.pack("<BQQQ", Opcode.FOOTER, FOOTER_BYTES - 9, start, offsets_at)
         self._write(summary)
-        self._record(records.Footer(start, offsets_at, crc))
+        self._write(footer + struct.pack("<I", zlib.crc32(footer, zlib.crc32(summary))))
         self._write(MAGIC)
         self.flush()
 
     def flush(self) -> None:
-        """Write what there is as far as the operating system; only now the file has its name.
+        """Hand everything to the operating system; the first time, the file takes its name.
 
-        A disk that does not take all of it gets none of it, and the file is closed: what it holds
-        can be read.
+        What the disk does not take in whole is taken back, and the file is closed: what it then
+        holds can be read.
         """
         waiting, self._waiting = b"".join(self._waiting), []
         try:
@@ -161,66 +176,27 @@ class Container:
 
     def _record(self, record: records.McapRecord) -> tuple[int, int]:
         """Write a record; return where it begins and how long it is."""
-        builder = RecordBuilder()
-        record.write(builder)
-        data, start = builder.end(), self._position
+        data, start = _to_bytes(record), self._position
         self._write(data)
         return start, len(data)
 
-
-class _Summary:
-    """What the end of the file says of the rest."""
-
-    def __init__(self) -> None:
-        self.schemas: list[records.Schema] = []
-        self.channels: list[records.Channel] = []
-        self.chunks: list[records.ChunkIndex] = []
-        self.attachments: list[records.AttachmentIndex] = []
-        self.metadata: list[records.MetadataIndex] = []
-        self._counts: dict[int, int] = {}
-
-    def declare(self, *declared: records.Schema | records.Channel) -> None:
-        """Note schemas and channels."""
-        self.schemas += [record for record in declared if isinstance(record, records.Schema)]
-        self.channels += [record for record in declared if isinstance(record, records.Channel)]
-
-    def add_chunk(self, chunk: records.ChunkIndex, counts: dict[int, int]) -> None:
-        """Note a chunk and its messages by channel."""
-        self.chunks.append(chunk)
-        for channel, count in counts.items():
-            self._counts[channel] = self._counts.get(channel, 0) + count
-
-    def build(self, start: int) -> tuple[bytes, int]:
-        """Return the summary that begins at `start`, and where its offsets begin."""
-        groups: list[tuple[Opcode, list[Any]]] = [
-            (Opcode.SCHEMA, self.schemas),
-            (Opcode.CHANNEL, self.channels),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, self.chunks),
-            (Opcode.ATTACHMENT_INDEX, self.attachments),
-            (Opcode.METADATA_INDEX, self.metadata),
-        ]
-        builder, offsets = RecordBuilder(), []
-        for opcode, group in groups:
-            begin = builder.count
-            for record in group:
-                record.write(builder)
-            if group:
-                offsets.append(records.SummaryOffset(opcode, start + begin, builder.count - begin))
-        at = start + builder.count
-        for offset in offsets:
-            offset.write(builder)
-        return builder.end(), at
-
     def _statistics(self) -> records.Statistics:
+        chunks, counts = self._summary[records.ChunkIndex], self._counts
         return records.Statistics(
-            attachment_count=len(self.attachments),
-            channel_count=len(self.channels),
-            channel_message_counts=self._counts,
-            chunk_count=len(self.chunks),
-            message_count=sum(self._counts.values()),
-            message_end_time=self.chunks[-1].message_end_time if self.chunks else 0,
-            message_start_time=self.chunks[0].message_start_time if self.chunks else 0,
-            metadata_count=len(self.metadata),
-            schema_count=len(self.schemas),
+            attachment_count=len(self._summary[records.AttachmentIndex]),
+            channel_count=len(self._summary[records.Channel]),
+            channel_message_counts=counts,
+            chunk_count=len(chunks),
+            message_count=sum(counts.values()),
+            message_end_time=chunks[-1].message_end_time if chunks else 0,
+            message_start_time=chunks[0].message_start_time if chunks else 0,
+            metadata_count=len(self._summary[records.MetadataIndex]),
+            schema_count=len(self._summary[records.Schema]),
         )
+
+
+def _to_bytes(*written: records.McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for record in written:
+        record.write(builder)
+    return bytes(builder.end())

@@ -1,1 +1,1 @@
-"""Rerun's file format: the reader; its writer is the sink in brrt.views.rerun."""
+"""Rerun's file format: events as Arrow columns, and the reader. The writer is brrt.views.rerun."""

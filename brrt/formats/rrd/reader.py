@@ -1,130 +1,189 @@
-"""Events out of .rrd, message by message from the front, so that a cut file gives what it has.
+"""Read a Rerun file that brrt wrote, through Rerun's own reader.
 
-It is not read by rerun-sdk, whose reader (0.41) gives up on a cut file, ends the process on some
-damage, and takes half a second to import.
+The file is a view of a run that also replays. Its format has no checksums of its contents, and
+Rerun's reader aborts the process on some damage: a file that was cut or damaged is refused as far
+as that shows, and the `.mcap` of the run, which is written beside it, is what replays then.
 """
 
 import json
-import zlib
+import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from os import SEEK_END
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow  # noqa: ICN001 - it gets that name below
-from numpy.typing import NDArray
+from rerun.chunk import LazyStore, RrdReader
 
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import FIELDS, Events, Field, Kind, Table, table_dtype
-from brrt.formats.integrity import (
-    BrokenError,
-    CutError,
-    DamagedError,
-    Numbering,
-    ReplacedError,
-    head,
-    in_front,
-)
-from brrt.formats.rrd.frames import opened, unpacked
-from brrt.formats.rrd.outline import END, MANIFEST, WORLD, Outline, reason
+from brrt.events import Events, Kind, Table
+from brrt.formats.integrity import Numbering, ReplacedError, parse_head
+from brrt.formats.rrd.columns import END, EVENTS, MANIFEST, WORLD, archetype, table_of
 from brrt.recording import Recording
 from brrt.scenario.manifest import Manifest
 
-pa: Any = pyarrow  # mypy knows none of its names
+_MAGIC, _HEAD, _FRAME = b"RRF2", 12, struct.Struct("<QQ")
+"""How a file begins, bytes before its first frame, and kind and length of each frame."""
+_TAIL = struct.Struct("<QQI8sI")
+"""The last bytes of a finished file: start, length and CRC-32 of its footer, magic, 1."""
+_TAIL_MAGIC = b"RRF2FOOT"
 
-TIMELINES = {"iteration": "iteration", "event": "seq", "t": "t"}
-"""The timelines, and the column of the events that each holds."""
+_MOST_FRAME = 1 << 23
+"""Bytes of a frame: events take up to 400,000, a world of 10 MB half of that. LZ4 turns a byte into
+at most 255, and Rerun holds them twice: a file made to exhaust the memory gets 4 GB."""
+_ANY, _TIMES = 1 << 26, 64
+"""Bytes of all events in memory: in any case, and times the size of the file."""
 
-_EVENTS_AT_ONCE = 1 << 16
+_KINDS = {f"{EVENTS}{kind.label}": kind for kind in Kind}
+_MOST_EVENTS = 1 << 16
+"""Events in a batch."""
 
 
-def read_rerun(path: Path) -> Recording:
+def read_rrd(path: Path) -> Recording:
     """Open a recording that `RerunSink` wrote.
 
-    Its batches raise `CutError` behind the last event of a file that was cut that is proved whole,
-    and `DamagedError` of one that is damaged.
-
     Raises:
-        RecordingError: The file cannot be read, or is no recording of brrt.
+        RecordingError: The file cannot be read, is cut or damaged, or is not a recording of brrt;
+            reading the batches raises it too.
     """
-    outline = Outline.of(path)
-    if MANIFEST not in outline.texts or WORLD not in outline.texts:
-        raise outline.stopped or RecordingError(
-            f"{path}: a Rerun file, but not a recording of brrt (no {MANIFEST})"
-        )
+    texts = _texts(path, _open(path))
+    if MANIFEST not in texts or WORLD not in texts:
+        raise RecordingError(f"{path}: a Rerun file, but not a recording of brrt (no {MANIFEST})")
+    if END not in texts:
+        raise _unusable(path, f"is cut, or was made of a file that was (no {END})")
+    end = texts[END]
     try:
-        texts = json.loads(outline.texts[MANIFEST]["json"])
-        manifest, world = head(path, dict(texts), outline.texts[WORLD]["json"])
-        figures, counts = (None, None) if outline.stopped else _ending(outline)
-    except RecordingError:
-        raise
+        strings = dict(json.loads(texts[MANIFEST]["json"]))
+        result = dict(json.loads(end["result"])) if "result" in end else None
+        stated = dict(json.loads(end.get("counts", "{}")))
+        counts = {kind: int(stated[kind.label]) for kind in Kind if kind.label in stated}
+        world_json, count = texts[WORLD]["json"], int(end["events"])
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise DamagedError(path, f"damaged: {error!r}") from None
-    return Recording(manifest, world, partial(_batches, outline, manifest), figures, counts)
+        raise _unusable(path, f"is damaged ({error!r:.200})") from None
+    manifest, world = parse_head(path, strings, world_json)
+    batches = partial(_batches, path, manifest, texts[MANIFEST], count)
+    return Recording(manifest, world, batches, result, counts or None)
 
 
-def _ending(outline: Outline) -> tuple[Mapping[str, Any] | None, Mapping[Kind, int] | None]:
-    """Return the figures and the events of each kind, as far as they are there."""
-    end = outline.texts.get(END, {})
-    figures = dict(json.loads(end["result"])) if "result" in end else None
-    stated = dict(json.loads(end.get("counts", "{}")))
-    counts = {kind: int(stated[kind.label]) for kind in Kind if kind.label in stated}
-    return figures, counts or None
+def _unusable(path: Path, why: str) -> RecordingError:
+    return RecordingError(f"{path}: {why}; replay the .mcap of the run")
 
 
-def _table(kind: Kind, dof: int, batch: Any) -> Table:
-    table = np.empty(batch.num_rows, table_dtype(kind, dof))
-    for timeline, name in TIMELINES.items():
-        times = batch.column(timeline)
-        if times.null_count:
-            raise BrrtError(f"{timeline}: an event without a time")
-        table[name] = times.cast("int64").to_numpy()
-    for each in FIELDS[kind]:
-        table[each.name] = from_arrow(each, batch.column(f"brrt.{kind.label}:{each.name}"), dof)
-    if (np.diff(table["seq"]) <= 0).any():
-        table = table[np.argsort(table["seq"], kind="stable")]
-    return table
+def _damaged(path: Path, error: Exception) -> RecordingError:
+    reason = (str(error).strip() or repr(error)).splitlines()[0]
+    return _unusable(path, f"is damaged ({reason.partition(f'{path}: ')[2] or reason:.200})")
 
 
-def from_arrow(field: Field, column: Any, dof: int) -> NDArray[Any]:
-    """Undo `to_arrow`; Rerun has wrapped each value into a list.
+def _open(path: Path) -> LazyStore:
+    """Return the chunks of the one recording in a file.
 
     Raises:
-        ValueError: There is not one value a row, or it is of another type.
+        RecordingError: The file is cut or damaged, or holds more than one recording.
     """
-    flat, rows = column.flatten(), len(column)
-    if field.type == "q":
-        if flat.type.list_size != dof:
-            raise ValueError(f"{field.name}: {flat.type.list_size} numbers, and not {dof}")
-        values, wanted = flat.flatten(), rows * dof
-    elif field.type == "q[]":
-        values, wanted = flat, len(flat)
-    else:
-        values, wanted = flat, rows
-    kind = pa.float64() if field.type in ("q", "q[]") else _arrow_type(field)
-    if values.type != kind or values.null_count or len(values) != wanted:
-        raise ValueError(f"{field.name}: {len(values)} values of {values.type} in {rows} rows")
-    numbers = np.asarray(values.to_numpy(zero_copy_only=False))
-    if field.type == "q":
-        return numbers.reshape(-1, dof)
-    if field.type != "q[]":
-        return numbers
-    parts = np.empty(rows, object)
-    ends = np.cumsum(np.asarray(column.value_lengths()))
-    for i, part in enumerate(np.split(numbers, ends[:-1])):
-        parts[i] = part.reshape(-1, dof)
-    return parts
+    try:
+        _check_frames(path)
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}") from None
+    try:
+        reader = RrdReader(path)
+        recordings = reader.recordings()
+        if len(recordings) == 1:
+            return reader.store()
+    except Exception as error:  # noqa: BLE001 - Rerun raises RuntimeError, ValueError and others
+        raise _damaged(path, error) from None
+    raise RecordingError(f"{path}: holds {len(recordings)} recordings; brrt reads a file with one")
 
 
-def _arrow_type(field: Field) -> Any:
-    return pa.from_numpy_dtype(np.dtype(field.type))
+def _check_frames(path: Path) -> None:
+    """Check that a file ends as a finished one does, and that its frames lead there.
+
+    Raises:
+        OSError: The file cannot be read.
+        RecordingError: It is cut or damaged.
+    """
+    with path.open("rb") as file:
+        if file.read(_HEAD)[: len(_MAGIC)] != _MAGIC:
+            raise RecordingError(f"{path}: not a Rerun recording")
+        size = file.seek(0, SEEK_END)
+        file.seek(max(0, size - _TAIL.size))
+        tail = file.read(_TAIL.size)
+        if len(tail) < _TAIL.size or not tail[:-4].endswith(_TAIL_MAGIC):
+            raise _unusable(path, "is cut")
+        at, end = _HEAD, size - _TAIL.size
+        while at < end:
+            file.seek(at)
+            length = _FRAME.unpack(file.read(_FRAME.size))[1]
+            if length > end - at - _FRAME.size:
+                raise _unusable(path, f"is damaged near byte {at:,}")
+            if length > _MOST_FRAME:
+                why = f"has a frame of {length:,} bytes; brrt reads up to {_MOST_FRAME:,}"
+                raise _unusable(path, why)
+            at += _FRAME.size + length
+
+
+def _texts(path: Path, store: LazyStore) -> dict[str, dict[str, str]]:
+    """Return the named texts of the entities at the beginning and at the end of a file."""
+    texts: dict[str, dict[str, str]] = {}
+    try:
+        for chunk in store.stream().filter(content=[MANIFEST, WORLD, END]):
+            entity, batch = chunk.entity_path, chunk.to_record_batch()
+            batch.validate(full=True)
+            prefix = f"{archetype(entity)}:"
+            for name in batch.schema.names:
+                if name.startswith(prefix) and batch.num_rows:
+                    value = batch.column(name)[-1].as_py()
+                    texts.setdefault(entity, {})[name.removeprefix(prefix)] = str(value[0])
+    except Exception as error:  # noqa: BLE001 - whatever damage leads Rerun and pyarrow to
+        raise _damaged(path, error) from None
+    return texts
+
+
+def _batches(
+    path: Path, manifest: Manifest, head: Mapping[str, str], count: int
+) -> Iterator[Events]:
+    """Yield the events in order.
+
+    Args:
+        path: The file.
+        manifest: The run's.
+        head: The texts that the manifest was read from.
+        count: How many events the file says that it has.
+
+    Raises:
+        RecordingError: The file is damaged, or another one than when it was opened.
+    """
+    store = _open(path)
+    if _texts(path, store).get(MANIFEST) != head:
+        raise ReplacedError(path)
+    waiting, numbering, unpacked = _Waiting(manifest.dof), Numbering(), 0
+    most = _ANY + _TIMES * path.stat().st_size
+    try:
+        for chunk in store.stream().filter(content=[f"{EVENTS}**"]):
+            kind = _KINDS.get(chunk.entity_path)
+            if kind is None or chunk.is_static:
+                continue
+            batch = chunk.to_record_batch()
+            unpacked += batch.nbytes
+            if unpacked > most:
+                raise BrrtError("it unpacks to more than any real file")  # noqa: TRY301
+            batch.validate(full=True)
+            waiting.add(kind, table_of(kind, manifest.dof, batch))
+            if waiting.last + 1 == numbering.next + waiting.count:
+                events = waiting.take()
+                numbering.take(events)
+                yield from _sliced(events)
+        if waiting.count or numbering.next != count:
+            there = numbering.next + waiting.count
+            raise BrrtError(f"{count:,} events were written, {there:,} are there")  # noqa: TRY301
+    except Exception as error:  # noqa: BLE001 - whatever damage leads Rerun and pyarrow to
+        raise _damaged(path, error) from None
 
 
 @dataclass(slots=True)
-class _Pool:
-    """Events that wait for the ones before them: each kind comes in messages of its own."""
+class _Waiting:
+    """Events that wait for earlier ones: each kind comes in chunks of its own."""
 
     dof: int
     tables: dict[Kind, list[Table]] = field(default_factory=dict)
@@ -137,93 +196,28 @@ class _Pool:
         self.last = max(self.last, int(table["seq"].max(initial=-1)))
 
     def take(self) -> Events:
-        """Hand out all that waits, in order."""
-        tables = {kind: np.concatenate(parts) for kind, parts in sorted(self.tables.items())}
-        for kind, table in tables.items():
+        """Return all events, in order."""
+        tables: dict[Kind, Any] = {}
+        for kind, parts in sorted(self.tables.items()):
+            table = parts[0] if len(parts) == 1 else np.concatenate(parts)
             if (np.diff(table["seq"]) < 0).any():
-                tables[kind] = table[np.argsort(table["seq"], kind="stable")]
+                table = table[np.argsort(table["seq"], kind="stable")]
+            tables[kind] = table
         self.tables, self.count = {}, 0
         return Events(self.dof, tables)
 
 
-def _batches(outline: Outline, manifest: Manifest) -> Iterator[Events]:
-    """Yield the events in order, up to the first that is missing or not sound."""
-    pool, numbering = _Pool(manifest.dof), Numbering()
-    wrong: BrokenError | None = None
-    for kind, at, message in _messages(outline):
-        try:
-            _, batches = opened(unpacked(message))
-            for batch in batches:
-                pool.add(kind, _table(kind, manifest.dof, batch))
-        except Exception as error:  # noqa: BLE001 - whatever damage leads pyarrow to
-            wrong = outline.damaged(at, reason(error))
-            break
-        if pool.last + 1 == numbering.next + pool.count:
-            ready, unsound = numbering.beginning(pool.take())
-            yield from _sliced(ready)
-            if unsound is not None:
-                wrong = outline.damaged(at, str(unsound))
-                break
-    first, waiting = numbering.next, pool.count
-    rest, unsound = numbering.beginning(in_front(pool.take(), first))
-    yield from _sliced(rest)
-    missing = pool.last >= numbering.next
-    if unsound is None and not missing and waiting > numbering.next - first:
-        unsound = BrrtError("events are there twice")
-    if unsound is not None:
-        wrong = wrong or DamagedError(outline.path, f"damaged: {unsound}")
-    _check_end(outline, numbering.next, missing=missing, wrong=wrong)
-
-
-def _messages(outline: Outline) -> Iterator[tuple[Kind, int, bytes]]:
-    """Read the messages that hold events.
-
-    Raises:
-        RecordingError: They cannot be read, or are not those that were looked at.
-    """
-    try:
-        with outline.path.open("rb") as file:
-            for kind, at, length, crc in outline.places:
-                file.seek(at)
-                message = file.read(length)
-                if zlib.crc32(message) != crc:
-                    raise ReplacedError(outline.path)
-                yield kind, at, message
-    except OSError as error:
-        raise RecordingError(f"{outline.path}: {error.strerror or error}") from None
-
-
 def _sliced(events: Events) -> Iterator[Events]:
-    """Divide events, of which none is missing, into batches that are not too large."""
-    if len(events) <= _EVENTS_AT_ONCE:
+    """Divide events, of which none is missing, into batches of `_MOST_EVENTS`."""
+    if len(events) <= _MOST_EVENTS:
         if len(events):
             yield events
         return
     first, _ = events.kinds_in_order()
-    for begin in range(first, first + len(events), _EVENTS_AT_ONCE):
+    for begin in range(first, first + len(events), _MOST_EVENTS):
         tables = {}
         for kind, table in events.tables.items():
-            low, high = np.searchsorted(table["seq"], (begin, begin + _EVENTS_AT_ONCE))
+            low, high = np.searchsorted(table["seq"], (begin, begin + _MOST_EVENTS))
             if low < high:
                 tables[kind] = table[low:high]
         yield Events(events.dof, tables)
-
-
-def _check_end(outline: Outline, count: int, *, missing: bool, wrong: BrokenError | None) -> None:
-    """See that the file is whole, and no event missing at the end.
-
-    Raises:
-        CutError: The file was cut, or was made of one that was.
-        DamagedError: It is damaged, or lacks events.
-    """
-    end = outline.texts.get(END, {})
-    stated = end.get("events")
-    wrong = wrong or outline.stopped
-    if stated is not None and not wrong and (stated != str(count) or missing):
-        why = f"damaged: {stated} events were written, {count} are there"
-        wrong = DamagedError(outline.path, why)
-    if wrong is None and (missing or stated is None):
-        wrong = CutError(outline.path, "was made of a file that was cut: the end is missing")
-    if wrong is not None:
-        complete = stated == str(count) and not missing
-        raise wrong.judged(complete=complete, ended="result" in end)

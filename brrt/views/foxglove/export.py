@@ -20,8 +20,8 @@ import numpy as np
 from mcap import records
 
 from brrt.files import replacing
-from brrt.formats.mcap.cdr import MESSAGE
 from brrt.formats.mcap.container import Container
+from brrt.formats.mcap.messages import MESSAGE
 from brrt.recording import Recording
 from brrt.views.foxglove.draw_world import static_messages
 from brrt.views.foxglove.layout import layout

@@ -9,10 +9,10 @@ import rerun.blueprint as rrb
 from brrt.comparison.difference import Difference
 from brrt.comparison.events import first_difference
 from brrt.events import Events
+from brrt.formats.rrd.columns import time_columns
 from brrt.recording import Recording
 from brrt.views.colours import RUNS, Colour
 from brrt.views.rerun import layout
-from brrt.views.rerun.arrow import time_columns
 from brrt.views.rerun.draw.canvas import times_of
 from brrt.views.rerun.drawing import RunDrawing
 from brrt.views.rerun.ring import draw_ring, place_of

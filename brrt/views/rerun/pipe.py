@@ -1,11 +1,10 @@
-"""A pipe into a file, for a writer that must not meet a full disk itself."""
+"""A pipe into a file, for a writer that hangs when the disk is full."""
 
 import fcntl
 import os
 import select
 import threading
 import time
-import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -18,20 +17,18 @@ _BLOCK = 1 << 20
 _PAUSE_S = 0.0005
 
 
-class Drain:
-    """Takes what comes out of a pipe and puts it into a file, on a thread of its own.
+class FilePipe:
+    """Copies what is written into a pipe to a file, on a thread of its own.
 
-    Rerun's file writer (rerun-sdk 0.41) gives up at the first write that fails, and then `flush`,
-    `disconnect` and the interpreter's end may wait for it for ever. So it writes into this pipe,
-    which takes everything; what the disk did not take is kept as an error.
+    Rerun's file writer (rerun-sdk 0.41) stops at the first write that fails, and then `flush`,
+    `disconnect` and the interpreter's exit may wait for it for ever. So it writes into this pipe,
+    which accepts everything; the first error of the disk is kept and raised by `wait` and `close`.
 
     Args:
-        path: The file; it is overwritten, but not before `settle` or `close`.
+        path: The file; it is overwritten, but not before `wait` or `close`.
 
     Attributes:
-        size: Bytes that have come through.
-        crc: Their CRC-32.
-        inlet: File name to write to; it can be opened until `leave` is called.
+        inlet: File name to write to; it can be opened until `close_inlet` is called.
 
     Raises:
         RecordingError: The file cannot be written.
@@ -40,42 +37,36 @@ class Drain:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._error: Exception | None = None
-        self.size = self.crc = 0
         try:
             self._file = OutputFile(path)
         except OSError as error:
-            raise self._cannot_write(error) from None
+            raise self._write_error(error) from None
         self._inlet: int | None
         self._outlet, self._inlet = os.pipe()
-        with suppress(AttributeError, OSError):  # a larger pipe is for Linux, and if it likes
+        with suppress(AttributeError, OSError):  # only Linux has larger pipes, and may refuse them
             fcntl.fcntl(self._inlet, fcntl.F_SETPIPE_SZ, _BLOCK)
         self.inlet = f"/dev/fd/{self._inlet}"
-        self._at_work = threading.Lock()
-        self._thread = threading.Thread(target=self._work, name="brrt drain", daemon=True)
+        self._copying = threading.Lock()
+        self._thread = threading.Thread(target=self._copy, name="brrt pipe", daemon=True)
         self._thread.start()
 
-    def leave(self) -> None:
-        """Leave the pipe to who has opened the inlet: once they close it, the file is complete."""
+    def close_inlet(self) -> None:
+        """Close this end of the pipe; the file ends when all who opened the inlet close it."""
         if self._inlet is not None:
             os.close(self._inlet)
             self._inlet = None
 
-    def settle(self) -> None:
-        """Wait until the file has all that was written to the inlet so far, and its name.
+    def wait(self) -> None:
+        """Wait until the file has everything that was written to the inlet so far, and its name.
 
         Raises:
             RecordingError: The disk did not take it.
         """
-        while self._thread.is_alive() and _readable(self._outlet).poll(0):
+        while self._thread.is_alive() and _poll(self._outlet).poll(0):
             time.sleep(_PAUSE_S)
-        with self._at_work:
-            if self._error is None:
-                self._trying(self._file.appear)
+        with self._copying:
+            self._try(self._file.appear)
         self._check()
-
-    def _check(self) -> None:
-        if self._error is not None:
-            raise self._cannot_write(self._error) from None
 
     def close(self) -> None:
         """Wait for the end of the pipe and close the file.
@@ -83,39 +74,45 @@ class Drain:
         Raises:
             RecordingError: The disk did not take everything.
         """
-        self.leave()
+        self.close_inlet()
         self._thread.join()
         self._check()
 
-    def _work(self) -> None:
-        # Whatever happens here, the pipe is emptied: who writes to it would wait for ever.
-        waiting = _readable(self._outlet)
+    def _copy(self) -> None:
+        # The pipe is emptied even after an error: its writer would wait for ever.
+        waiting = _poll(self._outlet)
         while waiting.poll():
-            with self._at_work:
+            with self._copying:
                 block = os.read(self._outlet, _BLOCK)
                 if not block:
                     break
-                self.size, self.crc = self.size + len(block), zlib.crc32(block, self.crc)
-                if self._error is None:
-                    self._trying(partial(self._file.write, block))
+                self._try(partial(self._file.write, block))
         os.close(self._outlet)
-        if self._error is None:
-            self._trying(self._file.appear)
-        self._trying(self._file.close)
-
-    def _trying(self, action: Callable[[], None]) -> None:
+        self._try(self._file.appear)
         try:
-            action()
-        except Exception as error:  # noqa: BLE001 - told on the caller's thread
+            self._file.close()
+        except OSError as error:
             self._error = self._error or error
 
-    def _cannot_write(self, error: Exception) -> WriteError:
+    def _try(self, action: Callable[[], None]) -> None:
+        """Do something with the file, unless it has failed before."""
+        if self._error is None:
+            try:
+                action()
+            except Exception as error:  # noqa: BLE001 - raised again on the caller's thread
+                self._error = error
+
+    def _check(self) -> None:
+        if self._error is not None:
+            raise self._write_error(self._error) from None
+
+    def _write_error(self, error: Exception) -> WriteError:
         reason = getattr(error, "strerror", None) or str(error) or repr(error)
         return WriteError(self._path, reason)
 
 
-def _readable(pipe: int) -> select.poll:
-    """What waits until there is something in a pipe; each thread needs its own."""
+def _poll(pipe: int) -> select.poll:
+    """Return what waits for data in a pipe; each thread needs its own."""
     waiting = select.poll()
     waiting.register(pipe, select.POLLIN)
     return waiting

@@ -1,4 +1,4 @@
-"""Events into Rerun: exact columns to replay from, and a picture beside them."""
+"""Events into Rerun: exact columns to replay from, and a drawing beside them."""
 
 import json
 from pathlib import Path
@@ -6,35 +6,41 @@ from typing import Any
 
 import rerun as rr
 
-from brrt.errors import WriteError
-from brrt.events import FIELDS, Events, Kind
-from brrt.formats.batching import Gathering
-from brrt.formats.rrd.checksum import WRITTEN, stamp
-from brrt.formats.rrd.outline import CHECK, END, EVENTS, MANIFEST, OURS, WORLD, archetype
+from brrt.events import Events, Kind
+from brrt.formats.batching import Batching
+from brrt.formats.rrd.columns import (
+    END,
+    EVENTS,
+    MANIFEST,
+    OURS,
+    WORLD,
+    archetype,
+    event_columns,
+    time_columns,
+)
 from brrt.recording import Result
 from brrt.scenario.manifest import Manifest
-from brrt.views.rerun.arrow import event_columns, time_columns
 from brrt.views.rerun.drawing import RunDrawing
 from brrt.views.rerun.layout import application, blueprint, recording_id
-from brrt.views.rerun.pipe import Drain
+from brrt.views.rerun.pipe import FilePipe
 from brrt.views.rerun.stream import connect, new_stream
 from brrt.views.viewer import process
 from brrt.worlds.world import World
 
-_GATHERED, _FILE_S, _VIEW_S = 1 << 15, 0.5, 0.1
-"""Events that are written together, and for how long one may wait for that: on its way to a file
-alone, and to somebody who is looking."""
+_BATCH, _FILE_S, _VIEW_S = 1 << 15, 0.5, 0.1
+"""Events that are written together, and seconds that one may wait for that, on its way to a file
+and to a viewer."""
 
 _WINDOW = 1 << 16
-"""How many bytes back the compression of Rerun's files (LZ4) finds what comes again. Each column of
-a chunk begins with the same offsets, 4 bytes a row, which so take no space but in the first one."""
+"""How many bytes back the compression of Rerun's files (LZ4) finds repetitions. Each column of a
+chunk begins with the same offsets, 4 bytes a row, which so take space in the first column only."""
 
 
 class RerunSink:
     """Writes every event, exactly, to an .rrd file or a live viewer, and draws what happens.
 
-    Manifest and world come first; if the run ended well, its figures come last. What waits to be
-    written does not do so for long, as in `McapSink`.
+    Batches are joined as in `McapSink`. brrt reads the file once it is closed: the MCAP file of a
+    run is the one that survives a kill. A full disk is an error, although Rerun hangs on it.
 
     Args:
         manifest: The run's.
@@ -55,20 +61,19 @@ class RerunSink:
         path: Path | str | None = None,
         view: bool = False,
     ) -> None:
-        self._manifest, self._view = manifest, view
-        self._path = None if path is None else Path(path)
+        self._view, self._layout = view, blueprint(manifest, world)
         self._counts = dict.fromkeys(Kind, 0)
-        self._gathering = Gathering(manifest.dof, _GATHERED, _VIEW_S if view else _FILE_S)
-        self._chunk = max(256, _WINDOW // (8 * manifest.dof + 5))
-        self._layout = blueprint(manifest, world)
+        self._batching = Batching(manifest.dof, _BATCH, _VIEW_S if view else _FILE_S)
+        self._rows = max(256, _WINDOW // (8 * manifest.dof + 5))
         self._rec: Any = new_stream(recording_id(manifest), application(manifest, world))
         if view:
             process.open_viewer()
-        self._drain = None if self._path is None else Drain(self._path)
+        self._pipe = None if path is None else FilePipe(Path(path))
         try:
             first = blueprint(manifest, world, live=True) if view else self._layout
-            connect(self._rec, first, self._drain, view=view)
-            self._write_head(world)
+            connect(self._rec, first, self._pipe, view=view)
+            self._write_texts(MANIFEST, {"json": json.dumps(manifest.to_strings())})
+            self._write_texts(WORLD, {"json": world.to_json()})
             self._drawing = RunDrawing(self._rec, manifest, world)
             self._flush()
         except BaseException:
@@ -76,20 +81,20 @@ class RerunSink:
             raise
 
     def write(self, events: Events) -> None:
-        """Take a batch; small ones are gathered, then written and drawn.
+        """Take a batch; small ones are joined, then written and drawn.
 
         Raises:
-            RecordingError: The disk is full, or something else is wrong with the file.
+            RecordingError: The disk is full, or the file cannot be written for another reason.
         """
-        self._write(self._gathering.add(events))
+        self._write(self._batching.add(events))
 
     def annotate(self, name: str, texts: dict[str, str]) -> None:
-        """Keep named texts in the file, behind the events so far."""
-        self._write(self._gathering.take())
+        """Keep named texts in the file, after the events so far."""
+        self._write(self._batching.take())
         self._write_texts(f"{OURS}{name.rpartition('.')[2]}", texts)
 
     def close(self, result: Result | None) -> None:
-        """Write how it ended, and let go of file and viewer.
+        """Write what is pending, the number of events and the result; then disconnect.
 
         Raises:
             RecordingError: The file did not take everything.
@@ -97,81 +102,49 @@ class RerunSink:
         if self._rec is None:
             return
         try:
-            self._write(self._gathering.take())
+            self._write(self._batching.take())
             self._drawing.close(result)
-            end = {"events": str(sum(self._counts.values())), "stamp": WRITTEN}
+            end = {"events": str(sum(self._counts.values()))}
             if result is not None:
                 end["result"] = json.dumps(result)
                 end["counts"] = json.dumps({kind.label: n for kind, n in self._counts.items()})
             self._write_texts(END, end)
-            if self._view:  # the file is to open at its beginning, though the viewer is at the end
+            if self._view:  # the viewer follows what comes, the file opens at its start
                 self._rec.send_blueprint(self._layout, make_active=False)
-            self._hand_on()
+            self._flush()
         finally:
             self._disconnect()
 
     def _write(self, events: Events | None) -> None:
         if events is None:
             return
-        chunks = [
-            (kind, table[first : first + self._chunk])
-            for kind, table in events.tables.items()
-            for first in range(0, len(table), self._chunk)
-        ]
-        # By their first events, so that of a file that is cut little goes for want of a kind.
-        for kind, table in sorted(chunks, key=lambda chunk: int(chunk[1]["seq"][0])):
-            entity = f"{EVENTS}{kind.label}"
-            columns = event_columns(archetype(entity), FIELDS[kind], table)
-            self._rec.send_columns(entity, time_columns(table), columns)
-        self._flush()  # ahead of the drawing: a file that is cut there lacks none of these events
+        for kind, table in events.tables.items():
+            for first in range(0, len(table), self._rows):
+                rows = table[first : first + self._rows]
+                columns = event_columns(kind, rows)
+                self._rec.send_columns(f"{EVENTS}{kind.label}", time_columns(rows), columns)
+            self._counts[kind] += len(table)
         self._drawing.write(events)
-        for kind, count in events.counts.items():
-            self._counts[kind] += count
-        self._hand_on()
-
-    def _disconnect(self) -> None:
-        try:
-            self._rec.disconnect()
-        finally:
-            self._rec = None
-            if self._drain is not None:
-                self._drain.close()
-        if self._drain is not None and self._path is not None and self._path.is_file():
-            try:
-                stamp(self._path, self._drain.crc)
-            except OSError as error:
-                raise WriteError(self._path, error.strerror or str(error)) from None
-
-    def _write_head(self, world: World) -> None:
-        texts = {
-            MANIFEST: json.dumps(self._manifest.to_strings()),
-            WORLD: world.to_json(),
-        }
-        for entity, text in texts.items():
-            self._write_texts(entity, {"json": text})
+        self._flush()
 
     def _write_texts(self, entity: str, texts: dict[str, str]) -> None:
         value = rr.DynamicArchetype(archetype(entity), components=texts)
         self._rec.log(entity, value, static=True)
 
     def _flush(self) -> None:
-        """Hand everything on now: a killed run leaves all but its last batch.
-
-        Behind it comes a checksum of the file so far, since the format has none; what is read of
-        a file that was cut are the events ahead of its last checksum.
-        """
-        self._hand_on()
-        if self._drain is not None:
-            text = {"bytes": str(self._drain.size), "crc32": str(self._drain.crc)}
-            self._write_texts(CHECK, text)
-            self._hand_on()
-
-    def _hand_on(self) -> None:
         try:
             self._rec.flush()
         except RuntimeError:
             if not self._view:
                 raise
-            # Someone has closed the viewer. The file, which has its own way out, goes on.
-        if self._drain is not None:
-            self._drain.settle()
+            # The viewer was closed. The file does not depend on it.
+        if self._pipe is not None:
+            self._pipe.wait()
+
+    def _disconnect(self) -> None:
+        try:
+            self._rec.disconnect()
+        finally:
+            self._rec = None
+            if self._pipe is not None:
+                self._pipe.close()

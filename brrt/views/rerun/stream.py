@@ -1,4 +1,4 @@
-"""Rerun's recording streams, as all files and views of ours have them."""
+"""Rerun's recording streams: how they are named, and where they lead."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,15 +9,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from brrt.files import replacing
-from brrt.views.rerun.pipe import Drain
+from brrt.views.rerun.pipe import FilePipe
 from brrt.views.viewer import process
 
 
 def new_stream(name: str, application: str) -> Any:
-    """Make a stream that goes nowhere yet.
+    """Return a stream that leads nowhere yet.
 
     Args:
-        name: Tells it from others; equal for what is to be one.
+        name: Streams of one name are one recording in a viewer.
         application: A viewer keeps one layout for each.
     """
     rr.set_strict_mode(True)  # otherwise Rerun drops what it does not understand
@@ -26,16 +26,16 @@ def new_stream(name: str, application: str) -> Any:
     return rec
 
 
-def connect(rec: Any, layout: rrb.Blueprint, drain: Drain | None, *, view: bool) -> None:
-    """Let a stream run into a file, into the viewer that is open, or into both."""
+def connect(rec: Any, layout: rrb.Blueprint, pipe: FilePipe | None, *, view: bool) -> None:
+    """Let a stream lead into a file, into the viewer that is open, or into both."""
     sinks: list[Any] = [rr.GrpcSink(process.address())] if view else []
     try:
-        if drain is not None:
-            sinks.append(rr.FileSink(drain.inlet))
+        if pipe is not None:
+            sinks.append(rr.FileSink(pipe.inlet))
         rec.set_sinks(*sinks, default_blueprint=layout)
     finally:
-        if drain is not None:
-            drain.leave()
+        if pipe is not None:
+            pipe.close_inlet()
 
 
 @contextmanager

@@ -33,7 +33,7 @@ def test_round_trip_of_every_planner(planner: str, tmp_path: Path) -> None:
 
 def test_same_drawing_live_and_from_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In other batches, a run gives the same drawing in the end."""
-    monkeypatch.setattr(sink, "_GATHERED", 1)
+    monkeypatch.setattr(sink, "_BATCH", 1)
     live, again, file = (tmp_path / name for name in ("live.rrd", "again.rrd", "run.mcap"))
     run = Run(scenario("rrt-star"), batch=300)
     world = run.problem.world

@@ -9,9 +9,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Table
+from brrt.formats.rrd.columns import time_columns
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import Colour
-from brrt.views.rerun.arrow import line_strips, time_columns
+from brrt.views.rerun.arrow import line_strips
 from brrt.views.rerun.draw_world import places
 from brrt.worlds.world import World
 
