@@ -1,5 +1,6 @@
 """The history of a node, or of a cell, at any instant, against a slow twin."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -211,3 +212,16 @@ def test_bad_cells_are_one_line(brrt: Command) -> None:
     assert "have the numbers 0 to " in done.err
     done = brrt("replay", "a.mcap", "--node", 1, "--tree", 1)
     assert "has cells and no trees; give no tree" in done.err
+
+
+def test_rejections_left_out_add_up(brrt: Command) -> None:
+    """Of many rejections, four and the last are listed; with those left out they are all."""
+    brrt("plan", "--world", "gap2d:gap=1", "--iterations", 500, "--out", "run.mcap")
+    node = int(np.bincount(read(Path("run.mcap")).events()[Kind.REJECT]["node"]).argmax())
+    done = brrt("replay", "run.mcap", "--node", node).out
+    told = re.search(r"(\d+) extensions? from this node", done)
+    more = re.search(r"\.\.\. (\d+) more, the last:", done)
+    assert told is not None
+    assert more is not None
+    listed = re.findall(r"^ +event ", done, re.MULTILINE)
+    assert int(told[1]) == len(listed) + int(more[1])

@@ -296,7 +296,7 @@ def test_no_viewer_but_something_else(answer: bytes, monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(process, "PORT", server.getsockname()[1])
         if answer:
             threading.Thread(target=_answer, args=(server, answer), daemon=True).start()
-        with pytest.raises(RecordingError, match=f"listens at port {process.PORT}; end it, or"):
+        with pytest.raises(RecordingError, match=f"program at port {process.PORT} is not"):
             process.open_viewer()
 
 

@@ -1,0 +1,62 @@
+"""The facts in words."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from brrt import (
+    Scenario,
+    read,
+    snapshot,
+)
+from brrt.explanation import explain
+from tests.conftest import Result
+from tests.support.explanations import STAR, explained
+
+Command = Callable[..., Result]
+
+
+def test_it_fits_a_screen(brrt: Command) -> None:
+    """80 columns, and at most 33 lines; from Python it is the same text."""
+    for args in (["--world", "gap2d:gap=1", "--iterations", 2000],
+                 ["--planner", "lrta-star", "--world", "bugtrap2d", "--param", "epsilon=3"],
+                 ["--planner", "rrt-star", "--iterations", 2000]):  # fmt: skip
+        brrt("plan", *args, "--out", "run.mcap", "--force")
+        text = brrt("explain", "run.mcap").out
+        assert all(len(line) <= 80 for line in text.splitlines())
+        assert len(text.splitlines()) <= 33
+        assert text == str(explain(snapshot(read(Path("run.mcap"))))) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [(["none.mcap"], "none.mcap: No such file"), (["a.mcap", "--at-event", "-2"], "count from 0")],
+)
+def test_bad_input_is_one_line(args: list[Any], message: str, brrt: Command) -> None:
+    """Exit code 2."""
+    brrt("plan", "--out", "a.mcap")
+    done = brrt("explain", *args)
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert message in done.err
+
+
+def test_words_of_a_lattice_search() -> None:
+    """A cell is entered once, not 1 times, and no tree grows."""
+    scenario = Scenario(world="empty2d", planner="lrta-star", params={"epsilon": 3}, iterations=20)
+    found = explained(scenario)
+    rows = dict(found.rows())
+    assert rows["moves"] == "20; each cell was entered once"
+    assert "reached at the very end" in rows["nearest"]
+    assert "growing" not in str(found)
+    assert "still planning" in dict(explained(STAR, iteration=200).rows())["outcome"]
+
+
+def test_a_solved_run(brrt: Command) -> None:
+    """Two trees meet in the passage: the path leads through, and no node is called outside."""
+    brrt("plan", "--world", "passage2d:gap=0.3", "--planner", "rrt-connect", "--out", "run.mcap")
+    done = brrt("explain", "run.mcap").out
+    assert "the run's path leads through it" in " ".join(done.split())
+    assert "got through" not in done
+    assert "nearest" not in done
