@@ -4,7 +4,7 @@ import os
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,7 @@ from brrt.formats.rrd import reader
 from brrt.formats.rrd.columns import END, Column, event_columns, time_columns, to_arrow
 from brrt.formats.rrd.reader import read_rrd
 from brrt.views.rerun import sink
-from brrt.views.rerun.layout import blueprint
-from brrt.views.rerun.sink import RerunSink, RunWriter
-from brrt.views.rerun.stream import new_stream, saved
+from brrt.views.rerun.sink import RerunSink
 from tests.conftest import recorded
 from tests.support.files import part, same, write
 from tests.support.logs import split
@@ -244,30 +242,33 @@ def test_foreign_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def forged(path: Path) -> Any:
-    """Give a writer of a file and its stream, to write what no sink does; it has no end."""
+def forged(path: Path) -> Iterator[RerunSink]:
+    """Give a sink to write what none does; nothing ends its file as the sink would."""
     run, _ = recorded(SCENARIOS["2d"])
-    rec = new_stream("forged", "brrt forged")
-    with saved(rec, blueprint(run.manifest, run.problem.world), path):
-        yield rec, RunWriter(rec, run.manifest, run.problem.world)
+    sink = RerunSink(run.manifest, run.problem.world, path=path)
+    try:
+        yield sink
+        sink._rec.flush()
+    finally:
+        sink._disconnect()
 
 
 def test_files_of_older_versions(tmp_path: Path) -> None:
     """Texts that older versions wrote, checks and a stamp, are passed over."""
     path = tmp_path / "old.rrd"
     _, log = recorded(SCENARIOS["2d"])
-    with forged(path) as (_, writer):
-        writer.write_texts("/brrt/check", {"bytes": "7", "crc32": "7"})
-        writer.write(log)
-        writer.write_texts(END, {"events": str(len(log)), "stamp": "QjZ~!crc#QZ~"})
+    with forged(path) as sink:
+        sink._write_texts("/brrt/check", {"bytes": "7", "crc32": "7"})
+        sink.write(log)
+        sink._write_texts(END, {"events": str(len(log)), "stamp": "QjZ~!crc#QZ~"})
     assert same(read(path).events(), log)
 
 
 def test_made_of_a_cut_file(tmp_path: Path) -> None:
     """A file that other tools finished, and that has no end of brrt's, is one that was cut."""
     path = tmp_path / "x.rrd"
-    with forged(path) as (_, writer):
-        writer.write(recorded(SCENARIOS["2d"])[1])
+    with forged(path) as sink:
+        sink.write(recorded(SCENARIOS["2d"])[1])
     with pytest.raises(RecordingError, match=rf"is cut, or was made of a file that was .*{POINTS}"):
         read(path)
 
@@ -298,10 +299,10 @@ def test_events_that_are_not_right(case: str, tmp_path: Path) -> None:
     """Events that are missing, doubled or impossible."""
     make, message = BROKEN[case]
     path, (_, log) = tmp_path / "x.rrd", recorded(SCENARIOS["2d"])
-    with forged(path) as (_, writer):
+    with forged(path) as sink:
         for batch in make(log):
-            writer.write(batch)
-        writer.write_texts(END, {"events": str(len(log))})
+            sink.write(batch)
+        sink._write_texts(END, {"events": str(len(log))})
     with pytest.raises(RecordingError, match=rf"x\.rrd: is damaged \(.*({message}).*\){POINTS}"):
         read(path).events()
 
@@ -330,7 +331,7 @@ def test_columns_of_other_types(case: str, tmp_path: Path) -> None:
     path = tmp_path / "x.rrd"
     phase = lists([0], pa.uint8())
     given = {NAME: phase, STATUS: phase, **change}
-    with forged(path) as (rec, writer):
+    with forged(path) as sink:
         columns = [
             Column(rr.ComponentDescriptor(name, archetype="brrt.phase"), values)
             for name, values in given.items()
@@ -339,7 +340,7 @@ def test_columns_of_other_types(case: str, tmp_path: Path) -> None:
         rec.send_columns(
             "/ev/phase", time_columns(np.zeros(1, table_dtype(Kind.PHASE, 2))), columns
         )
-        writer.write_texts(END, {"events": "1"})
+        sink._write_texts(END, {"events": "1"})
     with pytest.raises(RecordingError, match=rf"x\.rrd: is damaged \(.*{message}.*\){POINTS}"):
         read(path).events()
 
@@ -358,8 +359,8 @@ def test_files_that_unpack_to_much(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_a_manifest_that_is_none(text: str, tmp_path: Path) -> None:
     """A manifest that is no table, nests, or is empty."""
     path = tmp_path / "x.rrd"
-    with forged(path) as (_, writer):
-        writer.write_texts("/brrt/manifest", {"json": text})
-        writer.write_texts(END, {"events": "0"})
+    with forged(path) as sink:
+        sink._write_texts("/brrt/manifest", {"json": text})
+        sink._write_texts(END, {"events": "0"})
     with pytest.raises(RecordingError, match=rf"x\.rrd: is damaged \(.*{POINTS}"):
         read(path)
