@@ -58,7 +58,7 @@ def rrd_file(
     rec = new_stream(name, application)
     try:
         buffer = rec.binary_stream()
-        rec.send_blueprint(layout, make_active=False)
+        rec.send_blueprint(layout)  # active: the web viewer ignores a default that comes late
         yield rec
         data = buffer.read(flush=True) or b""
     finally:
