@@ -61,7 +61,7 @@ def test_python_is_refused() -> None:
     points = np.zeros((2, 2))
     tree, space = rooted_kdtree(points[:1], 4), space_of(2)
     nearest_of_all(tree, space, points, np.zeros(2, np.int64))
-    with pytest.raises(TypeError, match="nearest is called by kernels alone"):
+    with pytest.raises(TypeError, match="nearest can only be called by kernels"):
         nearest(tree, space, points, 0, 0)
 
 
