@@ -1,12 +1,12 @@
-"""LRTA* and RRT drive the seven course maps, beside a published run in slow Python.
+"""Compare LRTA* and RRT on seven maps of a planning course with a published run in slow Python.
 
     python benchmarks/courses.py MAPS [--runs 5]
 
-MAPS holds course maps in the boundary/block format and their queries.json. LRTA* plans each move
-as it makes it (cells of 0.5, 6 neighbours, one cell of lookahead); RRT plans a path that is then
-driven in moves of at most 1, unsmoothed as in the published run. The time is that of planning, the
-median of the runs, for RRT over as many seeds; everything is recorded in memory. The charged moves
-are the published run's rule: a move for every deadline of 2 s that its planning took.
+MAPS is a folder with course maps in the boundary/block format and their queries.json. LRTA* plans
+each move as it makes it (cells of 0.5, 6 neighbours, one cell of lookahead); RRT plans a path that
+is then executed in moves of at most 1, unsmoothed as in the published run. The time is the median
+planning time of the runs, for RRT with different seeds; all events are recorded in memory. Charged
+moves follow the published run's rule: one move for every deadline of 2 s that planning took.
 """
 
 import argparse
@@ -41,7 +41,7 @@ def course(maps: Path, name: str, planner: str, seed: int = 0) -> Scenario:
 
 
 def measure(maps: Path, name: str, planner: str, runs: int) -> dict[str, Any]:
-    """Run a planner a few times; return the median of each figure."""
+    """Run a planner several times; return the median of each metric."""
     found = []
     for seed in range(runs):
         figures = Run(course(maps, name, planner, seed)).execute([Memory()]).as_dict()

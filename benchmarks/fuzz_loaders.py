@@ -1,11 +1,11 @@
-"""Spoil world files until a loader fails otherwise than in one line, and watch time and memory.
+"""Fuzz the loaders of world files: any failure other than a one-line error counts.
 
     python benchmarks/fuzz_loaders.py FILE [--seconds 60] [--seed 0] [--corpus DIR] [--keep DIR]
 
-FILE is one of those in `tests/world_files.py`, such as `map.yaml`; the others lie beside it. Where
-atheris is installed (`pip install atheris`), it steers by what the inputs reach in brrt, yaml,
-json and Pillow; otherwise files are spoiled at random. Inputs that fail are kept, and the slowest.
-The exit code is 1 if any failed.
+FILE is one of those in `tests/support/world_files.py`, such as `map.yaml`; the others are in the
+same folder. With atheris (`pip install atheris`), the coverage of brrt, yaml, json and Pillow
+guides the mutations; otherwise files are corrupted at random. Inputs that fail are kept, as is the
+slowest. The exit code is 1 if any failed.
 """
 
 import argparse
@@ -34,7 +34,7 @@ SEEN = (
     "brrt.worlds.loaders.yaml_fields",
     "brrt.worlds.loaders.convex_decomposition",
 )
-"""What is imported on demand otherwise."""
+"""Modules that loaders import on demand, so that atheris instruments them."""
 
 with (
     nullcontext()
@@ -46,16 +46,16 @@ with (
 
     for module in SEEN:
         import_module(module)
-    from tests.support.world_files import GOOD, spoiled, write
+    from tests.support.world_files import GOOD, corrupted, write
 
 LONGEST = 1 << 16
 
 
-class Watch:
-    """Load inputs one after the other, and remember what was seen."""
+class Fuzzer:
+    """Loads inputs one after the other, and records failures, time and memory."""
 
     def __init__(self, name: str, folder: Path, keep: Path, seconds: float) -> None:
-        self.path = folder / f"spoiled.{name}"
+        self.path = folder / f"corrupted.{name}"
         self.settings = {"obstacles": "circle_obstacles.txt"} if "queries" in name else {}
         self.query = "0" if name.startswith(("grid.scen", "circle_queries")) else ""
         self.keep, self.ends = keep, time.perf_counter() + seconds
@@ -65,7 +65,7 @@ class Watch:
         self.first_peak = 0
 
     def __call__(self, data: bytes) -> None:
-        """Load one input; end the process when the time is over."""
+        """Load one input; end the process when the time is up."""
         self.path.write_bytes(data)
         start = time.perf_counter()
         try:
@@ -74,7 +74,7 @@ class Watch:
         except BrrtError as error:
             if not str(error).isprintable() or len(str(error)) > 600:
                 self._fail(f"message: {str(error)[:200]!r}", data)
-        except Exception:  # noqa: BLE001 - that is what is looked for
+        except Exception:  # noqa: BLE001 - any other exception is a failure
             lines = traceback.format_exc().strip().splitlines()
             self._fail(f"{lines[-1][:200]} {lines[-3].strip()}", data)
         taken = time.perf_counter() - start
@@ -95,7 +95,7 @@ class Watch:
             self.failures[what] = data
 
     def report(self) -> None:
-        """Print one line, and one a failure."""
+        """Print one line, and one for each failure."""
         print(
             f"{self.path.name}: {self.tried:,} inputs, {self.loaded:,} loaded, "
             f"{len(self.failures)} kinds of failure, peak {_peak()} MB ({self.first_peak} MB after "
@@ -110,7 +110,7 @@ def _peak() -> int:
 
 
 def main() -> None:
-    """Spoil until the time is over."""
+    """Fuzz until the time is up."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -128,16 +128,16 @@ def main() -> None:
         seeds = [folder / args.file, *(args.corpus.iterdir() if args.corpus else ())]
         for i, seed in enumerate(seeds):
             (corpus / str(i)).write_bytes(seed.read_bytes())
-        watch = Watch(args.file, folder, args.keep, args.seconds)
+        fuzzer = Fuzzer(args.file, folder, args.keep, args.seconds)
         if atheris is None:
             rng = Random(args.seed)  # noqa: S311
             files = [path.read_bytes() for path in corpus.iterdir()]
             while True:
-                watch(spoiled(rng.choice(files), rng)[:LONGEST])
+                fuzzer(corrupted(rng.choice(files), rng)[:LONGEST])
 
         def mutate(data: bytes, most: int, seed: int) -> bytes:
             rng = Random(seed)  # noqa: S311
-            return spoiled(data, rng)[:most] if rng.random() < 0.5 else atheris.Mutate(data, most)
+            return corrupted(data, rng)[:most] if rng.random() < 0.5 else atheris.Mutate(data, most)
 
         options = [
             f"-seed={args.seed + 1}",
@@ -145,7 +145,7 @@ def main() -> None:
             "-rss_limit_mb=0",
             "-verbosity=0",
         ]
-        atheris.Setup([sys.argv[0], *options, str(corpus)], watch, custom_mutator=mutate)
+        atheris.Setup([sys.argv[0], *options, str(corpus)], fuzzer, custom_mutator=mutate)
         atheris.Fuzz()
 
 

@@ -1,4 +1,4 @@
-"""A world in characters, as large as the terminal allows."""
+"""A world drawn with characters, as large as the terminal allows."""
 
 from typing import TYPE_CHECKING
 
@@ -15,27 +15,27 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _SAMPLES = 4
-"""Points of a pixel along each axis."""
+"""Sample points in a pixel along each axis."""
 _DEPTH = 32
-"""Points along the line of sight, in 3D."""
+"""Sample points along the line of sight, in 3D."""
 _FAINT = 0.25
-"""Share that what is too thin to be met by points is taken to have."""
+"""Covered share of a pixel with an obstacle too thin for the sample points."""
 _SHADES = {2: (0.05, 0.22, 0.45, 0.75), 3: (0.02, 0.12, 0.3, 0.6)}
-"""From which share on a character is one darker; a look through a whole world meets little."""
+"""Covered shares from which on characters get darker, by dimension."""
 _BLOCKS, _LETTERS = " ░▒▓█", " .:*#"
 _FRAMES = {True: tuple("┌─┐│└┘"), False: tuple("+-+|++")}
 
 
 def draw_world(world: "World", columns: int, rows: int, *, blocks: bool) -> Text:
-    """Draw a world: in 2D as it is, in 3D from above and from the side.
+    """Draw a world, in 3D from above and from the side.
 
-    Darker characters have more of an obstacle in them, in 3D along the whole line of sight.
+    Darker characters are covered more by obstacles, in 3D along the whole line of sight.
 
     Args:
         world: The world.
-        columns: Characters in a line, at most.
-        rows: Lines, at most.
-        blocks: Whether the terminal has block characters; otherwise ASCII has to do.
+        columns: Maximum characters in a line.
+        rows: Maximum lines.
+        blocks: Whether to use block characters; otherwise ASCII.
     """
     if world.dim == 2:
         return Text("\n").join(_panel(world, (0, 1), columns, rows, blocks=blocks))
@@ -58,11 +58,11 @@ def draw_world(world: "World", columns: int, rows: int, *, blocks: bool) -> Text
 def _panel(
     world: "World", axes: tuple[int, int], columns: int, rows: int, *, blocks: bool
 ) -> list[Text]:
-    """Draw a world in a frame, along the other axis if there is one."""
+    """Draw a world in a frame, seen along the third axis if there is one."""
     from brrt.views.colours import GOAL, START  # noqa: PLC0415 - keep --help fast
 
     size = (world.upper - world.lower)[list(axes)]
-    # A character is about twice as high as wide: it holds two pixels, one above the other.
+    # A character is about twice as high as wide: it contains two pixels, one above the other.
     pixel = max(size[0] / (columns - 2), size[1] / (2 * (rows - 2)))
     width, height = (max(1, round(side / pixel)) for side in size)
     height += height % 2
@@ -94,7 +94,7 @@ def _panel(
 
 
 def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "Floats":
-    """Measure which share of each pixel is covered, rows from below; shape (height, width)."""
+    """Return the covered share of each pixel, rows from below; shape (height, width)."""
     from brrt.worlds.free_space import occupied  # noqa: PLC0415 - keep --help fast
 
     counts = dict(zip(axes, (width * _SAMPLES, height * _SAMPLES), strict=True))
@@ -114,7 +114,7 @@ def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "
 
 
 def _thin(world: "World", width: int, height: int) -> "NDArray[np.bool_]":
-    """Find the pixels that something thinner than the distance of the points touches."""
+    """Return which pixels an obstacle touches that is thinner than the points' distance."""
     from brrt.worlds import World  # noqa: PLC0415
     from brrt.worlds.obstacle_arrays import obstacle_arrays  # noqa: PLC0415
     from brrt.worlds.rasterize import Raster  # noqa: PLC0415
@@ -130,5 +130,5 @@ def _thin(world: "World", width: int, height: int) -> "NDArray[np.bool_]":
         world.boxes[sides.min(axis=1) < least],
         polygons=tuple(polygon for polygon in world.polygons if len(polygon) == 2),
     )
-    lattice = Raster(world.lower, cell, (width, height))
-    return lattice.blocked(obstacle_arrays(thin)).T
+    raster = Raster(world.lower, cell, (width, height))
+    return raster.blocked(obstacle_arrays(thin)).T

@@ -1,4 +1,4 @@
-"""`brrt worlds`: what there is, what a world looks like, and saving one."""
+"""`brrt worlds`: list the generators and file formats, show a world, save one."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ Named = Annotated[
     str,
     typer.Argument(
         metavar="WORLD",
-        help="A generator with parameters, as circles2d:n=80,seed=3, or a file.",
+        help="A generator with parameters, such as circles2d:n=80,seed=3, or a file.",
         show_default=False,
     ),
 ]
@@ -51,7 +51,7 @@ def worlds(context: typer.Context, *, as_json: Json = False) -> None:
 @app.command("list")
 def list_worlds(
     name: Annotated[
-        str | None, typer.Argument(help="One generator alone.", show_default=False)
+        str | None, typer.Argument(help="Only this generator or format.", show_default=False)
     ] = None,
     *,
     as_json: Json = False,
@@ -71,7 +71,7 @@ def list_worlds(
     print_described({key: entry for key, entry in entries.items() if entry["params"] or name})
     if name is None:
         for line in (
-            "Look at one: brrt worlds show circles2d:n=80,seed=3, or map.yaml:unknown=free",
+            "Show one: brrt worlds show circles2d:n=80,seed=3, or map.yaml:unknown=free",
             "Plan in one: brrt plan --world arena.map.scen#12",
         ):
             out.print(line, markup=False)
@@ -104,7 +104,7 @@ def show(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw a world, and say what it is made of, how much is free, and whether there is a way.
+    """Draw a world, with its obstacles, its free share, and whether start and goal connect.
 
     brrt worlds show circles2d:n=80,seed=3
 
@@ -123,11 +123,11 @@ def show(
         watch.update(0, "measuring the free share", "")
         figures["free"], figures["free_error"] = free_fraction(made)
         if made.start is not None and made.goal is not None:
-            watch.update(0, "looking for a way", "")
+            watch.update(0, "searching a path", "")
             found = connected(made, made.start, made.goal)
             figures |= {"connected": found.connected, "cell": found.cell, "way": found.reason}
         watch.update(0, "drawing", "")
-        drawing = None if as_json else _sketch(made)
+        drawing = None if as_json else _drawing(made)
         _write(made, picture, rrd, view=view)
     if as_json:
         print_json(figures)
@@ -135,10 +135,10 @@ def show(
     out.print(drawing, soft_wrap=True)
     print_pairs(_rows(figures))
     if picture is not None:
-        out.print(f"\n{picture}: the picture", markup=False, soft_wrap=True)
+        out.print(f"\n{picture}: a picture of it", markup=False, soft_wrap=True)
     if rrd is not None:
         name = escape(str(rrd))
-        out.print(f"\n{name}: look at it with [bold]rerun {name}[/bold]", soft_wrap=True)
+        out.print(f"\n{name}: open it with [bold]rerun {name}[/bold]", soft_wrap=True)
 
 
 @app.command()
@@ -190,7 +190,7 @@ def _point(option: str, text: str | None) -> Any:
         raise BrrtError(f"{option} must be numbers like 1,2, not {text!r}") from None
 
 
-def _sketch(world: "World") -> Any:
+def _drawing(world: "World") -> Any:
     from .draw_world import draw_world  # noqa: PLC0415 - keep --help fast
 
     try:
@@ -198,7 +198,7 @@ def _sketch(world: "World") -> Any:
         blocks = True
     except (UnicodeEncodeError, LookupError):
         blocks = False
-    # Nobody scrolls a pipe or a file: there, the usual page will do.
+    # A pipe or a file has no height; 42 lines is a page.
     rows = max(out.size.height - 2, 20) if out.is_terminal else 42
     return draw_world(world, max(out.size.width, 24), rows, blocks=blocks)
 
@@ -215,7 +215,7 @@ def _write(world: "World", picture: Path | None, rrd: Path | None, *, view: bool
 
 
 def _figures(world: "World") -> dict[str, Any]:
-    """What the world consists of, for people and for programs."""
+    """Return the world's properties under the names that `--json` prints."""
     segments = sum(len(polygon) == 2 for polygon in world.polygons)
     grid = None
     if world.grid is not None:
@@ -249,7 +249,7 @@ def _figures(world: "World") -> dict[str, Any]:
 
 
 def _counts(figures: dict[str, Any]) -> Iterator[str]:
-    """The obstacles by their shapes, as far as there are any."""
+    """Yield the number of obstacles of each shape that there are."""
     flat = figures["dim"] == 2
     names = {
         "balls": ("circle", "circles") if flat else ("sphere", "spheres"),
@@ -286,6 +286,6 @@ def _rows(f: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
 def _share(share: float, error: float) -> str:
     if error == 0:
         return f"{100 * share:.6g} %"
-    # Two digits of the error, and as many of the share.
+    # Two digits of the error, and as many decimals of the share.
     digits = max(0, 1 - int(f"{100 * error:e}".partition("e")[2]))
     return f"{100 * share:.{digits}f} %, standard error {100 * error:.{digits}f} %"

@@ -1,4 +1,4 @@
-"""Draw one world of each generator: the gallery of the README.
+"""Draw one world of each generator, for the README.
 
     python docs/worlds.py [OUT.png]
 
@@ -22,11 +22,11 @@ from brrt.views.matplotlib.draw_world import plot_world
 COLUMNS, SIDE_IN = 8, 1.7
 
 SHOWN = {"circles2d": "n=40", "squares2d": "n=60", "spheres3d": "n=30", "boxes3d": "n=30"}
-"""Parameters that show better what a generator is about than its defaults."""
+"""Parameters for generators whose defaults are less typical."""
 
 
 def main() -> None:
-    """Draw them all on one sheet."""
+    """Draw all of them into one picture."""
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".png")
     rows = -(-len(GENERATORS) // COLUMNS)
     sheet = plt.figure(figsize=(COLUMNS * SIDE_IN, rows * SIDE_IN * 1.1), layout="constrained")
@@ -43,7 +43,7 @@ def main() -> None:
             axes.set_box_aspect(world.upper - world.lower, zoom=1.25)
     sheet.savefig(out, dpi=110)
     with Image.open(out) as whole:
-        flat = whole.convert("RGB")  # in fewer colours it takes half the bytes
+        flat = whole.convert("RGB")  # half the size with fewer colours
     octree, none = Image.Quantize.FASTOCTREE, Image.Dither.NONE
     flat.quantize(256, method=octree, dither=none).save(out, optimize=True)
 

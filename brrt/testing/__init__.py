@@ -1,1 +1,1 @@
-"""Regression tests for planners: golden runs, and gates on the figures of many seeds."""
+"""Regression tests for planners: golden runs, and gates on the metrics of many seeds."""

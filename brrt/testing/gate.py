@@ -1,14 +1,15 @@
-"""A gate on the figures of many seeds: did a change make a planner worse by more than a margin?
+"""A gate on the metrics of many seeds: does a change make a planner worse by more than a margin?
 
-Runs of the same seed are pairs. That paths are no longer found is tested by McNemar's exact test.
-Where both found one, it is tested of each figure whether the new one, divided by 1 + margin, is
-larger than the old one: by Wilcoxon's signed ranks on the logarithms, with the exact distribution.
-Where a change does no harm beyond the margins, that is where within each pair old and scaled new
-could as well be swapped, or the new is smaller, all tests together fail with a chance of at most
-alpha (Bonferroni). Nothing is assumed of how the figures are distributed. On the same code a gate
-always comes to the same verdict: it does not pass today and fail tomorrow.
+Runs with the same seed are pairs. Lost solutions are tested by McNemar's exact test. For pairs in
+which both runs found a path, Wilcoxon's signed-rank test on the logarithms decides for each metric
+whether the new value, divided by 1 + margin, is larger than the old one.
 
-`benchmarks/gate.py` measures false alarms, and what is found with which chance.
+If a change does no harm beyond the margins (in each pair, the old and the scaled new value are
+exchangeable, or the new one is smaller), the gate fails with a probability of at most alpha over
+all tests (Bonferroni), whatever the distribution of the metrics. The same code always gets the same
+verdict.
+
+`benchmarks/gate.py` measures the rate of false alarms and the power.
 """
 
 import math
@@ -22,29 +23,29 @@ import numpy as np
 from brrt.errors import BrrtError, unknown
 from brrt.scenario.command import command
 from brrt.scenario.scenario import Scenario
-from brrt.testing import ranks
-from brrt.testing.figures import PROBLEM, Figures, Source
+from brrt.testing.paired_tests import log_ratios, lower_bound, sign_test, signed_rank_test
+from brrt.testing.seed_metrics import PROBLEM, SeedMetrics, Source
 
 ALPHA = 0.01
-"""Chance of a false alarm."""
+"""Default probability of a false alarm."""
 
 SEEDS = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
-    """What became of one figure.
+class MetricVerdict:
+    """The outcome of one test.
 
     Attributes:
-        name: The figure.
-        margin: Relative increase that is allowed; None for `solved`, where none is.
-        old: Median of the pairs in which both found a path, not a number where there is none; of
-            `solved`, how many did.
-        new: The same of the new runs.
+        name: The metric, or `solved`.
+        margin: Relative increase that is allowed; None for `solved`, which has no margin.
+        old: Median of the pairs in which both found a path, NaN if there are none; for `solved` the
+            number of runs that found one.
+        new: The same for the new runs.
         at_least: Relative increase that the data prove, at the confidence of this test.
-        p: How likely figures this much worse are where no harm was done.
+        p: Probability of a result at least this bad if no harm was done.
         passed: Whether p is above this test's share of alpha.
-        worst: Seed whose figure grew most.
+        worst: Seed whose metric grew most.
     """
 
     name: str
@@ -59,55 +60,55 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a gate found.
+    """The outcome of a gate.
 
     Attributes:
         name: What was judged.
-        seeds: How many pairs.
-        alpha: Chance of a false alarm, over all figures.
-        identical: Whether each run's figures are the old ones, to the last bit.
-        figures: One for each test.
-        scenario: What the new runs ran; None where a function made them.
+        seeds: Number of pairs.
+        alpha: Probability of a false alarm, over all tests.
+        identical: Whether all metrics are equal to the last bit.
+        metrics: One verdict for each test.
+        scenario: The new runs' scenario; None if a function made them.
     """
 
     name: str
     seeds: int
     alpha: float
     identical: bool
-    figures: tuple[Judged, ...]
+    metrics: tuple[MetricVerdict, ...]
     scenario: Scenario | None = None
 
     @property
     def passed(self) -> bool:
-        """Whether none was made worse beyond its margin."""
-        return all(each.passed for each in self.figures)
+        """Whether every test passed."""
+        return all(each.passed for each in self.metrics)
 
     def lines(self) -> list[str]:
-        """Tell it in plain text of 80 columns."""
+        """Write it as plain text of 80 columns."""
         outcome = "passed" if self.passed else "FAILED"
         head = f"{self.name}: {outcome}, {self.seeds} seeds"
         if self.identical:
-            return [f"{head}, each the same to the last bit"]
-        share = self.alpha / len(self.figures)
+            return [f"{head}, all equal to the last bit"]
+        share = self.alpha / len(self.metrics)
         rows = [_ROW.format("", "old", "new", "change", "proven", "allowed", "p", "").rstrip()]
-        rows += [_row(each, self.seeds) for each in self.figures]
-        often = f"{1 / self.alpha:,.0f} changes"
-        rows += [f"failed where p <= {share:.2g}: a false alarm at most once in {often}"]
-        worst = (each for each in self.figures if not each.passed and each.worst is not None)
-        return [head, *rows, *(line for each in worst for line in self._look(each))]
+        rows += [_row(each, self.seeds) for each in self.metrics]
+        changes = f"{1 / self.alpha:,.0f} changes"
+        rows += [f"failed if p <= {share:.2g}: at most one false alarm in {changes}"]
+        worst = (each for each in self.metrics if not each.passed and each.worst is not None)
+        return [head, *rows, *(line for each in worst for line in self._worst_seed(each))]
 
-    def _look(self, each: Judged) -> Iterator[str]:
-        """Name the seed that became worst, and the command that runs it where there is one."""
-        yield f"look at seed {each.worst}, whose {each.name} grew most"
+    def _worst_seed(self, each: MetricVerdict) -> Iterator[str]:
+        """Name the seed that got worst, and the command that runs it if there is one."""
+        yield f"{each.name} grew most with seed {each.worst}"
         if self.scenario is not None and each.worst is not None:
             yield "  " + command(replace(self.scenario, seed=each.worst), f"seed{each.worst}.mcap")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return it for JSON."""
         names = ("margin", "old", "new", "at_least", "p", "passed", "worst")
         figures = {
             each.name: {name: _plain(getattr(each, name)) for name in names}
-            for each in self.figures
+            for each in self.metrics
         }
         return {
             "name": self.name, "passed": self.passed, "seeds": self.seeds, "alpha": self.alpha,
@@ -119,8 +120,8 @@ _ROW = "  {:20}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8} {}"
 
 
 def gate(
-    new: Source | Figures,
-    against: Source | Figures | Path | str,
+    new: Source | SeedMetrics,
+    against: Source | SeedMetrics | Path | str,
     *,
     seeds: int | Iterable[int] = SEEDS,
     alpha: float = ALPHA,
@@ -129,137 +130,143 @@ def gate(
 ) -> Verdict:
     r"""Judge whether new runs are worse than old ones by more than the margins.
 
-        found = brrt.gate(new, old, seeds=20, cost=0.02, iterations=0.10)
-        print(*found.lines(), sep="\n")
+        verdict = brrt.gate(new, old, seeds=20, cost=0.02, iterations=0.10)
+        print(*verdict.lines(), sep="\n")
 
     Args:
-        new: A scenario, a function that makes a run or its figures of a seed, or figures at hand.
-        against: The same, or a file of `Figures`.
+        new: A scenario, a function of the seed that returns a run or its metrics, or metrics.
+        against: The same, or a file of metrics.
         seeds: How many, from 0 on, or which.
-        alpha: Chance of a false alarm over all figures together.
+        alpha: Probability of a false alarm over all metrics together.
         name: What the verdict calls it.
-        margins: For each figure, the relative increase that is allowed: `cost` (of the final path)
+        margins: For each metric, the relative increase that is allowed: `cost` (of the final path)
             or any count or cost that `brrt plan --json` prints.
 
     Raises:
-        BrrtError: A figure is unknown, the seeds are too few to find anything, or the two are
-            runs of different problems.
+        BrrtError: A metric is unknown, the seeds are too few to prove anything, or the runs are of
+            different problems.
     """
     numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
     check_question(numbers, alpha, margins)
-    old = _figures(against, "the old runs", numbers)
+    old = _metrics_of(against, "the old runs", numbers)
     return judge(
-        _figures(new, "the new runs", numbers), old, alpha=alpha, name=name, margins=margins
+        _metrics_of(new, "the new runs", numbers), old, alpha=alpha, name=name, margins=margins
     )
 
 
 def judge(
-    new: Figures, old: Figures, *, alpha: float, name: str, margins: Mapping[str, float]
+    new: SeedMetrics, old: SeedMetrics, *, alpha: float, name: str, margins: Mapping[str, float]
 ) -> Verdict:
-    """Judge figures at hand; both have the seeds of the new ones."""
+    """Judge metrics; the old ones must include the seeds of the new ones."""
     _check_problem(new, old)
     seeds = list(new.runs)
     pairs = [(old.runs[seed], new.runs[seed]) for seed in seeds]
-    found = [seed for seed, (a, b) in zip(seeds, pairs, strict=True) if a["solved"] and b["solved"]]
+    both = [seed for seed, (a, b) in zip(seeds, pairs, strict=True) if a["solved"] and b["solved"]]
     share = alpha / (len(margins) + 1)
-    judged = [_solved(pairs, share)]
-    judged += [
-        _judge(figure, margin, [(old.runs[n], new.runs[n]) for n in found], found, share)
-        for figure, margin in margins.items()
+    verdicts = [_judge_solved(pairs, share)]
+    verdicts += [
+        _judge_metric(metric, margin, [(old.runs[n], new.runs[n]) for n in both], both, share)
+        for metric, margin in margins.items()
     ]
-    _check_solved(judged[0], len(seeds), margins, alpha)
-    identical = all(a[figure] == b[figure] for a, b in pairs for figure in a.keys() & b.keys())
+    _check_solved(verdicts[0], len(seeds), margins, alpha)
+    identical = all(a[metric] == b[metric] for a, b in pairs for metric in a.keys() & b.keys())
     scenario = None if new.scenario is None else Scenario.parse(new.scenario)
-    return Verdict(name, len(seeds), alpha, identical, tuple(judged), scenario)
+    return Verdict(name, len(seeds), alpha, identical, tuple(verdicts), scenario)
 
 
-def _judge(
+def _judge_metric(
     name: str, margin: float, pairs: list[tuple[Any, Any]], seeds: list[int], share: float
-) -> Judged:
+) -> MetricVerdict:
     for run in (run for pair in pairs for run in pair):
         if name not in run:
-            raise unknown("figure", name, run.keys() - {"solved"})
+            raise unknown("metric", name, run.keys() - {"solved"})
     if not pairs:
-        return Judged(name, margin, math.nan, math.nan, -math.inf, 1.0, True, None)
+        return MetricVerdict(name, margin, math.nan, math.nan, -math.inf, 1.0, True, None)
     old, new = (np.array([pair[side][name] for pair in pairs], np.float64) for side in (0, 1))
-    grown = ranks.log_ratios(old, new)
+    growth = log_ratios(old, new)
     with np.errstate(over="ignore"):
-        proven = float(np.expm1(ranks.at_least(grown, share)))
-    p = ranks.signed_rank(ranks.log_ratios(old, new / (1 + margin)))
-    return Judged(
+        proven = float(np.expm1(lower_bound(growth, share)))
+    p = signed_rank_test(log_ratios(old, new / (1 + margin)))
+    return MetricVerdict(
         name, margin, float(np.median(old)), float(np.median(new)),
-        proven, p, p > share, seeds[int(np.argmax(grown))],
+        proven, p, p > share, seeds[int(np.argmax(growth))],
     )  # fmt: skip
 
 
-def _solved(pairs: list[tuple[Any, Any]], share: float) -> Judged:
+def _judge_solved(pairs: list[tuple[Any, Any]], share: float) -> MetricVerdict:
     old, new = ([bool(pair[side]["solved"]) for pair in pairs] for side in (0, 1))
     lost = sum(a and not b for a, b in zip(old, new, strict=True))
-    p = ranks.sign_test(lost, sum(b and not a for a, b in zip(old, new, strict=True)))
-    return Judged("solved", None, sum(old), sum(new), -math.inf, p, p > share, None)
+    p = sign_test(lost, sum(b and not a for a, b in zip(old, new, strict=True)))
+    return MetricVerdict("solved", None, sum(old), sum(new), -math.inf, p, p > share, None)
 
 
-def _figures(source: Source | Figures | Path | str, name: str, seeds: list[int]) -> Figures:
+def _metrics_of(
+    source: Source | SeedMetrics | Path | str, name: str, seeds: list[int]
+) -> SeedMetrics:
     if isinstance(source, Path | str):
-        name, source = str(source), Figures.load(Path(source))
-    if not isinstance(source, Figures):
-        return Figures.of(source, seeds)
+        name, source = str(source), SeedMetrics.load(Path(source))
+    if not isinstance(source, SeedMetrics):
+        return SeedMetrics.of(source, seeds)
     for seed in seeds:
         if seed not in source.runs:
-            raise BrrtError(f"{name}: no figures of seed {seed}; renew them with all seeds")
+            raise BrrtError(f"{name}: no metrics of seed {seed}; run all seeds again")
     return source.of_seeds(seeds)
 
 
 def check_question(seeds: list[int], alpha: float, margins: Mapping[str, Any]) -> None:
-    """Refuse a question that has no answer, before anything is run for it.
+    """Check that a gate can be decided, before anything is run.
 
     Raises:
-        BrrtError: The seeds are too few or the same, or a number is out of range.
+        BrrtError: The seeds are too few or repeated, or a number is out of range.
     """
     if not 0 < alpha < 1:
-        raise BrrtError(f"alpha must be a chance between 0 and 1, not {alpha!r}")
+        raise BrrtError(f"alpha must be a probability between 0 and 1, not {alpha!r}")
     for name, margin in margins.items():
         if not isinstance(margin, int | float) or not 0 <= margin < math.inf:
             raise BrrtError(f"margin of {name} must be from 0 on (0.02: 2 %), not {margin!r}")
     if len(set(seeds)) < len(seeds):
-        raise BrrtError("seeds must differ from each other")
-    least = _least(margins, alpha)
+        raise BrrtError("seeds must be different from each other")
+    least = _fewest_pairs(margins, alpha)
     if len(seeds) < least:
         raise BrrtError(
-            f"{len(seeds)} seeds prove nothing at alpha={alpha:g} with {len(margins)} figures; "
-            f"give at least {least}, better {SEEDS}"
+            f"{len(seeds)} seeds are too few to prove anything at alpha={alpha:g} with "
+            f"{len(margins)} metrics; give at least {least}, better {SEEDS}"
         )
 
 
-def _least(margins: Mapping[str, Any], alpha: float) -> int:
-    """Return how many pairs it takes to fail at all, were each of them worse."""
+def _fewest_pairs(margins: Mapping[str, Any], alpha: float) -> int:
+    """Return the number of pairs below which the gate passes even if each of them is worse."""
     return math.ceil(math.log2((len(margins) + 1) / alpha))
 
 
-def _check_solved(old: Judged, seeds: int, margins: Mapping[str, Any], alpha: float) -> None:
-    """Refuse where too few pairs are to be expected in which both find a path, were all as before.
+def _check_solved(
+    solved: MetricVerdict, seeds: int, margins: Mapping[str, Any], alpha: float
+) -> None:
+    """Check that enough pairs with two solutions are to be expected if nothing has changed.
 
     Raises:
         BrrtError: They are too few.
     """
-    least = _least(margins, alpha)
-    if margins and old.old**2 < least * seeds:
+    least = _fewest_pairs(margins, alpha)
+    if margins and solved.old**2 < least * seeds:
         raise BrrtError(
-            f"the old runs found a path with {old.old:.0f} of {seeds} seeds: too few pairs to "
-            f"prove anything of {', '.join(margins)}; give more seeds or a larger budget"
+            f"the old runs found a path with {solved.old:.0f} of {seeds} seeds: too few pairs to "
+            f"prove anything about {', '.join(margins)}; give more seeds or more iterations"
         )
 
 
-def _check_problem(new: Figures, old: Figures) -> None:
+def _check_problem(new: SeedMetrics, old: SeedMetrics) -> None:
     if new.scenario is None or old.scenario is None:
         return
     for key in PROBLEM:
         if new.scenario.get(key) != old.scenario.get(key):
-            ours, theirs = (f"{each.scenario.get(key)!r}" for each in (new, old) if each.scenario)
-            raise BrrtError(f"two problems, not two planners: {key} {ours} against {theirs}")
+            values = [f"{each.scenario.get(key)!r}" for each in (new, old) if each.scenario]
+            raise BrrtError(
+                f"the runs solve different problems: {key} {values[0]} against {values[1]}"
+            )
 
 
-def _row(each: Judged, seeds: int) -> str:
+def _row(each: MetricVerdict, seeds: int) -> str:
     mark = "" if each.passed else "FAIL"
     p = f"{each.p:.2g}"
     if each.margin is None:

@@ -1,4 +1,4 @@
-"""What the fixtures hand to a test.
+"""The objects that the fixtures return.
 
 PYTEST_DONT_REWRITE
 """
@@ -15,53 +15,54 @@ import pytest
 from brrt import BrrtError, Comparison, Recording, compare, read
 from brrt.runs.reproduce import TOLERANCE
 from brrt.testing import golden
-from brrt.testing.figures import Figures, Source
 from brrt.testing.gate import ALPHA, SEEDS, Verdict, check_question, gate
+from brrt.testing.seed_metrics import SeedMetrics, Source
 
-from .watch import LEDGER
+from .hooks import USAGE
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+=,-]*")
 
 _UPDATE = "pytest --brrt-update"
+_INTENDED = f"If this change is intended: {_UPDATE}, and commit it."
 
 
-class _Files:
+class _GoldenFiles:
     """The golden files of a test.
 
     Args:
-        request: The test's.
+        request: The test's request.
     """
 
     def __init__(self, request: pytest.FixtureRequest) -> None:
         self._config, self._node = request.config, request.node.nodeid
-        self._ledger = request.config.stash[LEDGER]
-        self._folder = self._ledger.folder_of(str(request.path))
+        self._usage = request.config.stash[USAGE]
+        self._folder = self._usage.folder_of(str(request.path))
         self.update = bool(self._config.getoption("brrt_update"))
 
     def path(self, name: str, ending: str) -> Path:
-        """Return a golden file's path, and note that it is used."""
+        """Return the path of a golden file, and record its use."""
         if not isinstance(name, str):
-            raise BrrtError(f"give the name of the golden file first, and not {name!r:.60}")
+            raise BrrtError(f"give the name of the golden file first, not {name!r:.60}")
         stem = name.removesuffix(ending)
         if not _NAME.fullmatch(stem):
-            raise BrrtError(f"name {name!r}: give letters, digits and -_.+=, for a file's name")
-        return self.note(Path(self._folder, stem + ending))
+            raise BrrtError(f"name {name!r}: a file's name has letters, digits and -_.+=, only")
+        return self.record_use(Path(self._folder, stem + ending))
 
-    def note(self, path: Path) -> Path:
-        """Note that a file is used."""
-        self._ledger.used.add(os.path.abspath(path))  # noqa: PTH100 - links stay as they are
+    def record_use(self, path: Path) -> Path:
+        """Record that a file is used."""
+        self._usage.used.add(os.path.abspath(path))  # noqa: PTH100 - resolve() follows links
         return path
 
-    def renewed(self, told: str) -> None:
-        """Note what was renewed; the test fails at its end."""
-        self._ledger.renewed.setdefault(self._node, []).append(told)
+    def record_renewal(self, message: str) -> None:
+        """Record that a file was made or renewed; the test fails at its end."""
+        self._usage.renewed.setdefault(self._node, []).append(message)
 
-    def told(self, path: Path) -> str:
-        """Name a file as the user can paste it."""
+    def shown(self, path: Path) -> str:
+        """Return a file's name as the user can paste it."""
         return os.path.relpath(path, self._config.invocation_params.dir)
 
     def failed(self, path: Path) -> Path:
-        """Return where a run is kept that is not what the golden one was; the tree is the same."""
+        """Return where a run that differs from a golden file is kept; folders are the same."""
         chosen = self._config.getoption("brrt_failed")
         folder: Path
         if chosen:
@@ -75,21 +76,21 @@ class _Files:
 
 
 def _headline(found: Comparison) -> str:
-    """Say in a few words what differs; pytest's summary has room for no more."""
+    """Say in a few words what differs; pytest's summary has no room for more."""
     first = found.first
-    return "other settings" if first is None else f"another run from event {first.seq} on"
+    return "different settings" if first is None else f"a different run from event {first.seq} on"
 
 
-def _fail(kept: Path, told: str) -> NoReturn:
-    """Fail the test; the message is kept as well, beside what was kept of the run."""
+def _fail(kept: Path, message: str) -> NoReturn:
+    """Fail the test, and write the message beside what is kept of the run."""
     __tracebackhide__ = True
-    kept.with_suffix(".txt").write_text(told + "\n", "utf-8")
-    pytest.fail(told, pytrace=False)
+    kept.with_suffix(".txt").write_text(message + "\n", "utf-8")
+    pytest.fail(message, pytrace=False)
 
 
 @contextmanager
-def _failing() -> Iterator[None]:
-    """Fail the test by one line where the input is bad."""
+def _errors_as_failures() -> Iterator[None]:
+    """Turn bad input into a failure of one line."""
     try:
         yield
     except BrrtError as error:
@@ -97,93 +98,87 @@ def _failing() -> Iterator[None]:
 
 
 class Golden:
-    """Holds runs against golden ones, event by event; see `Golden.__call__`."""
+    """Compares runs with golden ones, event by event; see `Golden.__call__`."""
 
     def __init__(self, request: pytest.FixtureRequest) -> None:
-        self._files = _Files(request)
+        self._files = _GoldenFiles(request)
 
     def __call__(
         self, name: str, run: golden.Source | None = None, *, tolerance: float = 0.0
     ) -> Recording:
-        """Hold a run against the golden one of a name; return the run.
+        """Compare a run with the golden one of a name; return the run.
 
         Args:
-            name: Of the file, without its ending.
-            run: A scenario, or the name of a scenario file; a `Run`, with a planner of your own if
-                you like; a `Recording`, or the name of a recording, by whatever program. Without
-                it the golden run's own scenario is planned anew.
-            tolerance: How far apart numbers may be, relative to the greater, and to 1 where both
-                are less; by default every bit counts. Times never count.
+            name: Name of the golden file, without its suffix.
+            run: A scenario or the name of a scenario file; a `Run`, which may have a planner of
+                your own; a `Recording` or the name of a recording, by any program. By default, the
+                golden run's own scenario is planned again.
+            tolerance: Allowed difference of numbers, relative to the greater one, and to 1 if both
+                are less; by default they must be equal to the last bit. Times are not compared.
         """
         __tracebackhide__ = True
-        with _failing():
+        with _errors_as_failures():
             path = self._files.path(name, ".mcap")
             if run is None and not path.exists():
                 raise BrrtError(
-                    f"no golden run {self._files.told(path)}; give brrt_golden the run as well, "
-                    f"or put one there: brrt plan --clock logical --out {self._files.told(path)}"
+                    f"no golden run {self._files.shown(path)}; give brrt_golden the run as well, "
+                    f"or make one: brrt plan --clock logical --out {self._files.shown(path)}"
                 )
             if isinstance(run, str | Path):
-                self._files.note(Path(run))
-            fresh = golden.fresh(golden.again(path) if run is None else run)
-            return self._hold(path, fresh, tolerance)
+                self._files.record_use(Path(run))
+            recording = golden.record(golden.reproduced(path) if run is None else run)
+            return self._check(path, recording, tolerance)
 
-    def _hold(self, path: Path, fresh: Recording, tolerance: float) -> Recording:
+    def _check(self, path: Path, recording: Recording, tolerance: float) -> Recording:
         __tracebackhide__ = True
         files = self._files
         if files.update:
-            self._renew(path, fresh, tolerance)
-            return fresh
+            self._renew(path, recording, tolerance)
+            return recording
         if not path.exists():
             raise BrrtError(
-                f"no golden run {files.told(path)}; make it: {_UPDATE}, look at it, commit it"
+                f"no golden run {files.shown(path)}; make it: {_UPDATE}, check it, commit it"
             )
         kept = files.failed(path)
-        found = self._compare(path, fresh, tolerance, files.told(kept))
+        found = self._compare(path, recording, tolerance, files.shown(kept))
         if not found.equal:
-            # Told of the files, so that it is what `brrt diff` prints of them.
-            golden.save(fresh, kept)
-            found = self._compare(path, read(kept), tolerance, files.told(kept))
-            lines = [
-                _headline(found),
-                *found.lines(),
-                "",
-                *self._rounded(path, fresh, tolerance),
-                f"If that is meant: {_UPDATE}, and commit it.",
-            ]
-            _fail(kept, "\n".join(lines))
-        return fresh
+            # Compare the files, so that the report is the one that `brrt diff` prints for them.
+            golden.save(recording, kept)
+            found = self._compare(path, read(kept), tolerance, files.shown(kept))
+            rounding = self._rounding_only(path, recording, tolerance)
+            _fail(kept, "\n".join([_headline(found), *found.lines(), "", *rounding, _INTENDED]))
+        return recording
 
-    def _rounded(self, path: Path, fresh: Recording, tolerance: float) -> Iterator[str]:
-        """Say so where another machine's rounding is all that there is."""
-        if tolerance < TOLERANCE and self._compare(path, fresh, TOLERANCE, "the run").equal:
-            yield f"Only the rounding differs: tolerance={TOLERANCE:g} lets that pass."
+    def _rounding_only(self, path: Path, recording: Recording, tolerance: float) -> Iterator[str]:
+        """Say if another machine's rounding is the only difference."""
+        if tolerance < TOLERANCE and self._compare(path, recording, TOLERANCE, "the run").equal:
+            yield f"Only the rounding differs: tolerance={TOLERANCE:g} accepts that."
 
-    def _renew(self, path: Path, fresh: Recording, tolerance: float) -> None:
-        told = self._files.told(path)
-        lines = [f"{told}: made; look at it (brrt view {told}) and commit it"]
+    def _renew(self, path: Path, recording: Recording, tolerance: float) -> None:
+        shown = self._files.shown(path)
+        lines = [f"{shown}: made; check it (brrt view {shown}) and commit it"]
         if path.exists():
             try:
-                found = self._compare(path, fresh, tolerance, "the run of today")
+                found = self._compare(path, recording, tolerance, "the new run")
             except BrrtError as error:
-                lines = [f"{told}: renewed, since it could not be read ({error})"]
+                lines = [f"{shown}: renewed, since it could not be read ({error})"]
             else:
                 if found.equal:
                     return
-                lines = [f"{told}: renewed; look at what changed and commit it", *found.lines()]
-        golden.save(fresh, path)
-        self._files.renewed("\n".join(lines))
+                lines = [f"{shown}: renewed; check what changed and commit it", *found.lines()]
+        golden.save(recording, path)
+        self._files.record_renewal("\n".join(lines))
 
-    def _compare(self, path: Path, fresh: Recording, tolerance: float, name: str) -> Comparison:
-        kept = read(path)
-        return compare(kept, fresh, names=(self._files.told(path), name), tolerance=tolerance)
+    def _compare(self, path: Path, recording: Recording, tolerance: float, name: str) -> Comparison:
+        names = (self._files.shown(path), name)
+        return compare(read(path), recording, names=names, tolerance=tolerance)
 
 
 class Gate:
-    """Holds figures over many seeds against stored ones; see `Gate.__call__`."""
+    """Compares metrics over many seeds with stored ones; see `Gate.__call__`."""
 
     def __init__(self, request: pytest.FixtureRequest) -> None:
-        self._files = _Files(request)
+        self._files = _GoldenFiles(request)
 
     def __call__(
         self,
@@ -194,65 +189,64 @@ class Gate:
         alpha: float = ALPHA,
         **margins: float,
     ) -> Verdict:
-        """Fail where the data prove that a run has become worse by more than the margins.
+        """Fail if the data prove that a run has become worse by more than the margins.
 
         Args:
-            run: A scenario, or a function that makes a run, or its figures, of a seed.
-            against: Name of a golden file of figures, or what to run for comparison.
+            run: A scenario, or a function of the seed that returns a run or its metrics.
+            against: Name of a golden file of metrics, or what to run for comparison.
             seeds: How many, from 0 on, or which.
-            alpha: Chance of a false alarm over all figures together.
-            margins: For each figure the relative increase that is allowed, as in
-                `brrt.testing.gate.gate`.
+            alpha: Probability of a false alarm over all metrics together.
+            margins: For each metric the relative increase that is allowed, as in `brrt.gate`.
         """
         __tracebackhide__ = True
         numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
 
-        def judged(new: Source | Figures, old: Source | Figures | Path, name: str) -> Verdict:
+        def judge(
+            new: Source | SeedMetrics, old: Source | SeedMetrics | Path, name: str
+        ) -> Verdict:
             return gate(new, old, seeds=numbers, alpha=alpha, name=name, **margins)
 
-        with _failing():
+        with _errors_as_failures():
             check_question(numbers, alpha, margins)
             if against is None:
                 raise BrrtError(
-                    "say what to hold it against: the name of a golden file (against='forest', "
-                    f"made by {_UPDATE}), or what to run"
+                    "give `against`: the name of a golden file (against='forest', made by "
+                    f"{_UPDATE}), or what to run for comparison"
                 )
             if isinstance(against, str):
                 path = self._files.path(against, ".json")
-                return self._against(path, Figures.of(run, numbers), judged)
-            verdict = judged(run, against, "gate")
+                return self._check(path, SeedMetrics.of(run, numbers), judge)
+            verdict = judge(run, against, "gate")
         if not verdict.passed:
             pytest.fail("\n".join(verdict.lines()), pytrace=False)
         return verdict
 
-    def _against(self, path: Path, new: Figures, judged: Callable[..., Verdict]) -> Verdict:
-        """Judge figures against stored ones, after these were renewed if that is what is wanted."""
+    def _check(self, path: Path, new: SeedMetrics, judge: Callable[..., Verdict]) -> Verdict:
+        """Judge metrics against stored ones, or renew these if that was requested."""
         __tracebackhide__ = True
-        told = self._files.told(path)
+        shown = self._files.shown(path)
         if self._files.update:
-            same = judged(new, new, told)
-            self._renew(path, new, judged)
-            return same
+            verdict = judge(new, new, shown)
+            self._renew(path, new, judge)
+            return verdict
         if not path.exists():
-            raise BrrtError(f"no golden figures {told}; make them: {_UPDATE}, and commit them")
-        verdict = judged(new, path, told)
+            raise BrrtError(f"no golden metrics {shown}; make them: {_UPDATE}, and commit them")
+        verdict = judge(new, path, shown)
         if not verdict.passed:
             kept = self._files.failed(path)
             new.save(kept)
-            _fail(
-                kept, "\n".join([*verdict.lines(), f"If that is meant: {_UPDATE}, and commit it."])
-            )
+            _fail(kept, "\n".join([*verdict.lines(), _INTENDED]))
         return verdict
 
-    def _renew(self, path: Path, new: Figures, judged: Callable[..., Verdict]) -> None:
-        told = self._files.told(path)
-        lines = [f"{told}: made; commit it"]
+    def _renew(self, path: Path, new: SeedMetrics, judge: Callable[..., Verdict]) -> None:
+        shown = self._files.shown(path)
+        lines = [f"{shown}: made; commit it"]
         if path.exists():
             try:
-                if Figures.load(path).holds(new):
+                if SeedMetrics.load(path).contains(new):
                     return
-                lines = judged(new, path, f"{told}: renewed; by the old ones").lines()
+                lines = judge(new, path, f"{shown}: renewed; against the old ones").lines()
             except BrrtError as error:
-                lines = [f"{told}: renewed, since it could not be compared with ({error})"]
+                lines = [f"{shown}: renewed, since it could not be compared ({error})"]
         new.save(path)
-        self._files.renewed("\n".join(lines))
+        self._files.record_renewal("\n".join(lines))

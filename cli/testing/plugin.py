@@ -1,4 +1,4 @@
-"""Options, settings and fixtures.
+"""Options, settings and fixtures of the plugin.
 
 PYTEST_DONT_REWRITE
 """
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from .ledger import Ledger
-from .watch import LEDGER, Watch
+from .hooks import USAGE, SessionHooks
+from .usage import GoldenUsage
 
 if TYPE_CHECKING:
     from .fixtures import Gate, Golden
@@ -21,19 +21,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--brrt-update",
         action="store_true",
-        help="Make and renew golden files. A test whose file this changes fails: look at what "
-        "changed, and commit it.",
+        help="Make and renew golden files. A test whose files change fails: check what changed, "
+        "and commit it.",
     )
     group.addoption(
         "--brrt-failed",
         metavar="DIR",
-        help="Keep runs and figures that failed here, with what was told of them "
-        "(default: in pytest's cache).",
+        help="Folder for failed runs and metrics, with their messages (default: in pytest's "
+        "cache).",
     )
     group.addoption(
         "--brrt-unused",
         choices=("report", "fail"),
-        help="What becomes of golden files that no test uses (default: the setting brrt_unused).",
+        help="What to do about golden files that no test uses (default: the setting brrt_unused).",
     )
     parser.addini(
         "brrt_golden_dir",
@@ -43,28 +43,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     parser.addini(
         "brrt_unused",
-        "report or fail: what becomes of golden files that no test uses.",
+        "report or fail: what to do about golden files that no test uses.",
         default="report",
     )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Begin to watch the session; refuse what must not be done."""
+    """Check options and settings, and register the hooks."""
     if config.getoption("brrt_update") and os.environ.get("CI"):
         raise pytest.UsageError(
-            "--brrt-update: golden files are not renewed in CI; do it by hand and commit"
+            "--brrt-update: golden files are not renewed in CI; renew them by hand and commit them"
         )
     setting = config.getini("brrt_unused")
     if setting not in ("report", "fail"):
         raise pytest.UsageError(f"brrt_unused must be report or fail, not {setting!r}")
     folder = config.getini("brrt_golden_dir")
-    config.stash[LEDGER] = Ledger(str(config.rootpath / folder) if folder else "")
-    config.pluginmanager.register(Watch(config), "brrt_watch")
+    config.stash[USAGE] = GoldenUsage(str(config.rootpath / folder) if folder else "")
+    config.pluginmanager.register(SessionHooks(config), "brrt_hooks")
 
 
 @pytest.fixture
 def brrt_golden(request: pytest.FixtureRequest) -> "Golden":
-    """Hold a run against a stored one.
+    """Compare a run with a stored one.
 
     brrt_golden("forest-rrt", brrt.Scenario(world="forest2d", seed=7))
 
@@ -77,11 +77,11 @@ def brrt_golden(request: pytest.FixtureRequest) -> "Golden":
 
 @pytest.fixture
 def brrt_gate(request: pytest.FixtureRequest) -> "Gate":
-    """Hold the figures of many seeds against stored ones.
+    """Compare the metrics of many seeds with stored ones.
 
     brrt_gate(scenario, against="forest-rrt", seeds=20, cost=0.02, iterations=0.10)
 
-    fails where the data prove that costs grew by more than 2 %, or iterations by more than 10 %.
+    fails if the data prove that costs grew by more than 2 %, or iterations by more than 10 %.
     """
     from .fixtures import Gate  # noqa: PLC0415 - brrt takes a second to import
 

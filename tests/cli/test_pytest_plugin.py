@@ -15,7 +15,7 @@ import yaml
 
 import brrt
 from brrt.testing import golden
-from brrt.testing.figures import Figures
+from brrt.testing.seed_metrics import SeedMetrics
 
 SCENARIO = 'brrt.Scenario(world="circles2d:n=40,seed=3", seed={})'
 ONE = f"""
@@ -99,7 +99,7 @@ def test_made_held_changed_and_renewed(pytester: pytest.Pytester, run: Pytest) -
     assert kept.read_bytes() == first
     renewed = run("--brrt-update")
     assert renewed.ret == 1
-    assert summary(renewed) == ["golden/forest.mcap: renewed; look at what changed and commit it"]
+    assert summary(renewed) == ["golden/forest.mcap: renewed; check what changed and commit it"]
     assert kept.read_bytes() != first
     assert run().ret == 0
     assert sorted(path.name for path in kept.parent.iterdir()) == ["forest.mcap"]
@@ -171,16 +171,19 @@ def test_file_of_another_program(brrt_golden, tmp_path):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        ('brrt_golden("../up", brrt.Scenario())', "name '../up': give letters"),
+        ('brrt_golden("../up", brrt.Scenario())', "name '../up': a file's name has"),
         ('brrt_golden("x")', "no golden run golden/x.mcap; give brrt_golden the run as well"),
-        ("brrt_golden(brrt.Scenario())", "give the name of the golden file first, and not Scen"),
-        ("brrt_gate(brrt.Scenario(), cost=0.1)", "say what to hold it against: the name of a"),
+        ("brrt_golden(brrt.Scenario())", "give the name of the golden file first, not Scen"),
+        ("brrt_gate(brrt.Scenario(), cost=0.1)", "give `against`: the name of a"),
         ('brrt_gate(lambda: 0, against="x", cost=0.1)', "give a scenario or a function of the"),
         ('brrt_golden("x", 7)', "give a Scenario, a Run, a Recording or a file"),
-        ('brrt_golden("x", brrt.Scenario(time=1.0))', "a budget of time ends each run elsewhere"),
+        ('brrt_golden("x", brrt.Scenario(time=1.0))', "a scenario with a time limit ends"),
         ('brrt_golden("x", "none.mcap")', "none.mcap: No such file or directory"),
-        ('brrt_gate(brrt.Scenario(), against="x", seeds=3, cost=0.1)', "3 seeds prove nothing"),
-        ('brrt_gate(brrt.Scenario(), against="x", cots=0.1)', "unknown figure 'cots'; did you"),
+        (
+            'brrt_gate(brrt.Scenario(), against="x", seeds=3, cost=0.1)',
+            "3 seeds are too few",
+        ),
+        ('brrt_gate(brrt.Scenario(), against="x", cots=0.1)', "unknown metric 'cots'; did you"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -230,10 +233,12 @@ def test_gate_made_held_changed_and_renewed(pytester: pytest.Pytester, run: Pyte
     assert (pytester.path / "failed" / "golden" / "figures.txt").read_text().rstrip() in text(
         failed
     )
-    fresh = Figures.load(pytester.path / "failed" / "golden" / "figures.json")
+    fresh = SeedMetrics.load(pytester.path / "failed" / "golden" / "figures.json")
     renewed = run("--brrt-update")
-    assert Figures.load(kept) == fresh
-    assert summary(renewed) == ["golden/figures.json: renewed; by the old ones: FAILED, 12 seeds"]
+    assert SeedMetrics.load(kept) == fresh
+    assert summary(renewed) == [
+        "golden/figures.json: renewed; against the old ones: FAILED, 12 seeds"
+    ]
     assert run().ret == 0
 
 
@@ -279,7 +284,7 @@ def test_tolerance(pytester: pytest.Pytester, run: Pytest) -> None:
     golden.save(doctored, kept)
     differs = run()
     assert differs.ret == 1
-    assert "Only the rounding differs: tolerance=1e-09 lets that pass." in text(differs)
+    assert "Only the rounding differs: tolerance=1e-09 accepts that." in text(differs)
     for tolerance, code in ((1e-10, 0), (1e-13, 1)):
         file.write_text(ONE.replace("seed=7)", f"seed=7), tolerance={tolerance}"))
         assert run().ret == code
@@ -293,11 +298,11 @@ def test_tolerance(pytester: pytest.Pytester, run: Pytest) -> None:
 
 STAND_IN = """
 import pytest
-from brrt_cli.testing.watch import LEDGER
+from brrt_cli.testing.hooks import USAGE
 
 @pytest.fixture
 def brrt_golden(request):
-    folder, used = request.path.parent / "golden", request.config.stash[LEDGER].used
+    folder, used = request.path.parent / "golden", request.config.stash[USAGE].used
     return lambda name: used.add(str(folder / name))
 """
 """A fixture that plans nothing: sessions with workers of their own are over in a second."""
@@ -532,11 +537,11 @@ def test_the_recipe_for_ci(
     command.chmod(0o755)
     monkeypatch.setenv("PATH", f"{command.parent}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(pytester.path / "summary.md"))
-    subprocess.run([bash, "-e", "-c", steps["Say what changed"]["run"]], check=True)
+    subprocess.run([bash, "-e", "-c", steps["Report what changed"]["run"]], check=True)
     failed = pytester.path / "failed"
     told = (pytester.path / "summary.md").read_text()
     assert told == (failed / "report.md").read_text()
-    headline = "another run from event 2 on"
+    headline = "a different run from event 2 on"
     assert told.startswith(f"### golden/forest\n```\n{headline}\nA  golden/forest.mcap\n")
     assert "The first difference is event 2" in told
     assert brrt.read(failed / "golden" / "forest.rrd").manifest.scenario.seed == 8

@@ -59,5 +59,5 @@ def test_recordings_are_self_contained(
     for file in ("whole.rrd", "again.rrd"):
         assert first_difference([read("run.mcap").events()], read(file).batches()) is None
     log = Memory()
-    golden.again(Path("run.mcap")).execute([log])
+    golden.reproduced(Path("run.mcap")).execute([log])
     assert first_difference([read("run.mcap").events()], [log.events()]) is None

@@ -1,4 +1,4 @@
-"""A small file of each format that loaders read, and ways to spoil it."""
+"""A small file of each format that loaders read, and ways to corrupt it."""
 
 import json
 import re
@@ -39,7 +39,7 @@ GOOD: dict[str, str | bytes] = {
     "polygon.geojson": GEOJSON,
     "world.json": JSON,
 }
-"""A file of each format, in a folder together."""
+"""A file of each format; they belong into one folder."""
 
 FORMATS = {
     "blocks.txt": "blocks", "grid.map": "movingai", "grid.scen": "scenarios", "map.yaml": "ros",
@@ -55,7 +55,7 @@ def write(folder: Path) -> None:
 
 
 def refused(action: Callable[[], object]) -> str:
-    """The message of the BrrtError that an action raises: one line, not endless."""
+    """Return the message of the BrrtError that an action raises; it must be one short line."""
     with pytest.raises(BrrtError) as error:
         action()
     message = str(error.value)
@@ -71,12 +71,12 @@ HOSTILE = (
     b"GeometryCollection", b"boundary", b"start:", b"version", b"type octile", b"1e-300", b"0x10",
     b"65535", b"true",
 )  # fmt: skip
-"""What stands where something else should."""
+"""Words that replace others."""
 
 WORDS = re.compile(rb"[^\s,:\[\]{}\"]+")
 
 
-def spoiled(data: bytes, rng: Random) -> bytes:
+def corrupted(data: bytes, rng: Random) -> bytes:
     """Change a file in one to four places: bytes, words, lines, or its length."""
     for _ in range(rng.randint(1, 4)):
         at = rng.randint(0, len(data))

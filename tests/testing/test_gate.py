@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import brrt
-from brrt.testing import ranks
-from brrt.testing.figures import Figures
+from brrt.testing import paired_tests
 from brrt.testing.gate import Verdict, gate, judge
+from brrt.testing.seed_metrics import SeedMetrics
 
 NUMBERS = st.one_of(
     st.floats(-3, 3, allow_subnormal=False), st.sampled_from([-2.0, -1.0, 0.0, 1.0, math.inf])
@@ -41,46 +41,47 @@ def test_signed_rank_counts_all_signs(differences: list[float]) -> None:
         for signs in product((False, True), repeat=len(told))
     ]
     expected = sum(each >= seen for each in sums) / len(sums)
-    assert ranks.signed_rank(np.array(differences)) == pytest.approx(expected, abs=1e-12)
+    p = paired_tests.signed_rank_test(np.array(differences))
+    assert p == pytest.approx(expected, abs=1e-12)
 
 
 @given(st.integers(0, 30), st.integers(0, 30))
 def test_sign_test_counts_all_tosses(worse: int, better: int) -> None:
     """P(at least as many) and P(fewer) make one."""
-    assert ranks.sign_test(worse, better) == pytest.approx(
-        1 - (ranks.sign_test(better + 1, worse - 1) if worse else 0)
+    assert paired_tests.sign_test(worse, better) == pytest.approx(
+        1 - (paired_tests.sign_test(better + 1, worse - 1) if worse else 0)
     )
-    assert ranks.sign_test(5, 0) == 1 / 32
+    assert paired_tests.sign_test(5, 0) == 1 / 32
 
 
 @given(st.integers(0, 10**6), st.integers(6, 25), st.sampled_from([0.01, 0.05]))
 def test_what_is_proven_is_what_the_test_rejects(seed: int, n: int, alpha: float) -> None:
     """A margin below what is proven fails, one above passes."""
     differences = np.random.default_rng(seed).normal(0.3, 1, n)
-    bound = ranks.at_least(differences, alpha)
+    bound = paired_tests.lower_bound(differences, alpha)
     if not math.isfinite(bound):
         assert 0.5**n > alpha
         return
-    assert ranks.signed_rank(differences - (bound - 1e-9)) <= alpha
-    assert ranks.signed_rank(differences - (bound + 1e-9)) > alpha
+    assert paired_tests.signed_rank_test(differences - (bound - 1e-9)) <= alpha
+    assert paired_tests.signed_rank_test(differences - (bound + 1e-9)) > alpha
 
 
 def test_log_ratios_at_the_ends() -> None:
     """Zero and infinity are figures too; two of the same say nothing."""
     old, new = np.array([0, 0, 1, 1, np.inf, np.inf]), np.array([0, 1, 0, np.inf, 1, np.inf])
     inf = math.inf
-    assert ranks.log_ratios(old, new).tolist() == [0, inf, -inf, inf, -inf, 0]
+    assert paired_tests.log_ratios(old, new).tolist() == [0, inf, -inf, inf, -inf, 0]
 
 
-def made(columns: dict[str, Any]) -> Figures:
-    """Figures at hand; `solved` unless it is said."""
+def made(columns: dict[str, Any]) -> SeedMetrics:
+    """SeedMetrics at hand; `solved` unless it is said."""
     n = len(next(iter(columns.values())))
     columns = {"solved": [True] * n, **columns}
     runs = {i: {name: values[i] for name, values in columns.items()} for i in range(n)}
-    return Figures(runs, None, VERSIONS)
+    return SeedMetrics(runs, None, VERSIONS)
 
 
-def drawn(rng: np.random.Generator, n: int, scale: float, shared: Any) -> Figures:
+def drawn(rng: np.random.Generator, n: int, scale: float, shared: Any) -> SeedMetrics:
     """A skewed cost, a heavy-tailed count with ties that grows with it, and paths not found."""
     noise = rng.normal(size=n)
     return made(
@@ -92,7 +93,7 @@ def drawn(rng: np.random.Generator, n: int, scale: float, shared: Any) -> Figure
     )
 
 
-def judged(new: Figures, old: Figures, alpha: float, margin: float) -> Verdict:
+def judged(new: SeedMetrics, old: SeedMetrics, alpha: float, margin: float) -> Verdict:
     """Judge both figures of `drawn`."""
     return judge(new, old, alpha=alpha, name="it", margins={"cost": margin, "count": margin})
 
@@ -119,20 +120,20 @@ def test_what_is_worse_is_found() -> None:
     rng = np.random.default_rng(2)
     old = drawn(rng, 20, 1.0, 0.0)
     found = judged(drawn(rng, 20, 1.4, 0.0), old, 0.01, 0.02)
-    assert [each.name for each in found.figures if not each.passed] == ["cost"]
+    assert [each.name for each in found.metrics if not each.passed] == ["cost"]
     assert "  cost" in "\n".join(found.lines())
     lost = made({"solved": [i % 2 == 0 for i in range(20)], "cost": [9.0] * 20})
     whole = made({"cost": [1.0] * 20})
     verdict = judge(lost, whole, alpha=0.01, name="it", margins={"cost": 0.5})
-    assert not any(each.passed for each in verdict.figures)
+    assert not any(each.passed for each in verdict.metrics)
     # A run without a path has no cost: it hides nothing that the others prove.
     some = {"solved": [i % 5 != 0 for i in range(20)]}
     few, worse = (made({**some, "cost": [cost] * 20}) for cost in (1.0, 9.0))
     verdict = judge(worse, few, alpha=0.01, name="it", margins={"cost": 0.5})
-    assert [each.passed for each in verdict.figures] == [True, False]
+    assert [each.passed for each in verdict.metrics] == [True, False]
     assert judge(whole, few, alpha=0.01, name="it", margins={"cost": 0.5}).passed
     verdict = judge(NONE, whole, alpha=0.01, name="it", margins={"cost": 0.5})
-    assert [each.passed for each in verdict.figures] == [False, True]
+    assert [each.passed for each in verdict.metrics] == [False, True]
     assert "no path" in "\n".join(verdict.lines())
 
 
@@ -142,8 +143,8 @@ def test_the_same_pass_at_once() -> None:
     found = gate(scenario, scenario, seeds=12, cost=0, iterations=0, alpha=0.01)
     assert found.passed
     assert found.identical
-    assert found.lines() == ["gate: passed, 12 seeds, each the same to the last bit"]
-    assert all(each.p == 1 for each in found.figures)
+    assert found.lines() == ["gate: passed, 12 seeds, all equal to the last bit"]
+    assert all(each.p == 1 for each in found.metrics)
 
 
 def test_lines_fit_the_screen_and_json_is_json() -> None:
@@ -157,11 +158,11 @@ def test_lines_fit_the_screen_and_json_is_json() -> None:
 
 def test_figures_are_kept(tmp_path: Path) -> None:
     """Written and read they are the same; a line a seed."""
-    figures = Figures.of(lambda seed: brrt.Run(brrt.Scenario(seed=seed, smooth=False)), [3, 1])
+    figures = SeedMetrics.of(lambda seed: brrt.Run(brrt.Scenario(seed=seed, smooth=False)), [3, 1])
     path = tmp_path / "new" / "figures.json"
     figures.save(path)
-    assert Figures.load(path) == figures
-    assert Figures.load(path).holds(figures.of_seeds([1]))
+    assert SeedMetrics.load(path) == figures
+    assert SeedMetrics.load(path).contains(figures.of_seeds([1]))
     assert [line[:6] for line in path.read_text().splitlines() if "iterations" in line] == [
         '  "3":', '  "1":'
     ]  # fmt: skip
@@ -172,15 +173,15 @@ def test_figures_are_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "not figures that brrt wrote"),
-        ("[]", "not figures that brrt wrote"),
+        ("", "not a file of metrics"),
+        ("[]", "not a file of metrics"),
         ('{"schema": "else", "version": 1}', r"not brrt\.figures of version 1"),
-        ('{"schema": "brrt.figures", "version": 1, "runs": {"x": {}}}', "not figures that brrt"),
+        ('{"schema": "brrt.figures", "version": 1, "runs": {"x": {}}}', "not a file of metrics"),
         (
             '{"schema": "brrt.figures", "version": 1, "runs": {"7": {"cost": NaN}}}',
             "7: cost must be a number from 0 on",
         ),
-        ("[" * 100_000, "not figures that brrt wrote"),
+        ("[" * 100_000, "not a file of metrics"),
     ],
 )
 def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> None:
@@ -188,7 +189,7 @@ def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> Non
     path = tmp_path / "figures.json"
     path.write_text(text)
     with pytest.raises(brrt.BrrtError, match=message) as error:
-        Figures.load(path)
+        SeedMetrics.load(path)
     assert str(error.value).startswith(str(path))
     assert "\n" not in str(error.value)
 
@@ -200,27 +201,30 @@ WHOLE, NONE = made({"cost": [1.0] * 20}), made({"solved": [False] * 20})
     ("call", "message"),
     [
         (lambda: gate(brrt.Scenario(), "none.json", cost=0.1), r"none\.json: No such file"),
-        (lambda: gate(brrt.Scenario(time=1.0), brrt.Scenario(), cost=0.1), "a budget of time"),
+        (
+            lambda: gate(brrt.Scenario(time=1.0), brrt.Scenario(), cost=0.1),
+            "a time limit",
+        ),
         (lambda: gate(None, brrt.Scenario(), cost=0.1), "give a scenario or a function"),  # type: ignore[arg-type]
         (lambda: gate(lambda seed: seed, brrt.Scenario(), cost=0.1), "seed 0: give a Scenario"),
         (
             lambda: gate(made({"a": [1]}), made({"a": [1]}), a=0.1),
-            "the old runs: no figures of seed 1;",
+            "the old runs: no metrics of seed 1;",
         ),
         (
             lambda: judge(WHOLE, NONE, alpha=0.01, name="it", margins={"cost": 0.5}),
-            "the old runs found a path with 0 of 20 seeds: too few pairs to prove anything of cost",
+            "the old runs found a path with 0 of 20 seeds: too few pairs to prove anything",
         ),
         (
             lambda: judge(WHOLE, WHOLE, alpha=0.01, name="it", margins={"cots": 0.5}),
-            "unknown figure 'cots'; did you mean 'cost'",
+            "unknown metric 'cots'; did you mean 'cost'",
         ),
-        (lambda: gate(brrt.Scenario(), brrt.Scenario(), seeds=[1] * 20), "must differ"),
+        (lambda: gate(brrt.Scenario(), brrt.Scenario(), seeds=[1] * 20), "must be different"),
         (lambda: gate(brrt.Scenario(), brrt.Scenario(), cost=-0.1), "margin of cost must be"),
         (lambda: gate(brrt.Scenario(), brrt.Scenario(), alpha=0, cost=0.1), "alpha must be"),
         (
             lambda: gate(brrt.Scenario(), brrt.Scenario(world="maze2d"), seeds=8, cost=0.1),
-            "two problems, not two planners: world 'circles2d' against 'maze2d'",
+            "the runs solve different problems: world 'circles2d' against 'maze2d'",
         ),
     ],
 )

@@ -9,20 +9,20 @@ from hypothesis import strategies as st
 
 from brrt import BrrtError
 from brrt.worlds import World, load_world
-from tests.support.world_files import GOOD, spoiled, write
+from tests.support.world_files import GOOD, corrupted, write
 
 
 @pytest.mark.parametrize("name", GOOD)
 @settings(max_examples=150)
 @given(rng=st.randoms(use_true_random=False))
-def test_spoiled_files(name: str, rng: Random, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_corrupted_files(name: str, rng: Random, tmp_path_factory: pytest.TempPathFactory) -> None:
     """Bytes, words and lines changed, taken away or put in, in files of every format."""
-    folder = tmp_path_factory.getbasetemp() / "spoiled"
+    folder = tmp_path_factory.getbasetemp() / "corrupted"
     if not folder.exists():
         folder.mkdir()
         write(folder)
-    path = Path(folder, f"{Path(name).stem}.spoiled{Path(name).suffix}")
-    path.write_bytes(spoiled((folder / name).read_bytes(), rng))
+    path = Path(folder, f"{Path(name).stem}.corrupted{Path(name).suffix}")
+    path.write_bytes(corrupted((folder / name).read_bytes(), rng))
     query = "0" if name.startswith(("grid.scen", "circle_queries")) else ""
     try:
         world = load_world(

@@ -1,8 +1,8 @@
-"""The hooks that follow a session: what was collected, what ran, what is left over.
+"""Pytest hooks that record which golden files a session uses.
 
-A claim that a golden file is unused needs all tests that could use it. Whatever keeps one from
-running to its end, be it -k, --lf, a skip, a failure, a worker's crash, leaves it unsettled, and
-then nothing is claimed of its folder.
+A golden file is reported as unused only if all tests that could use it ran to their end. A test
+that did not, because of -k, --lf, a skip, a failure or a worker's crash, is not complete, and no
+file of its folder is reported.
 
 PYTEST_DONT_REWRITE
 """
@@ -14,77 +14,77 @@ from typing import Any
 
 import pytest
 
-from .ledger import Ledger
+from .usage import GoldenUsage
 
-LEDGER = pytest.StashKey[Ledger]()
+USAGE = pytest.StashKey[GoldenUsage]()
 
 FIXTURES = frozenset({"brrt_golden", "brrt_gate"})
 
 _OUTPUT = "brrt"
 
 
-class Watch:
-    """Keeps the ledger of a session.
+class SessionHooks:
+    """The hooks of a session.
 
     Args:
-        config: The session's.
+        config: The session's configuration.
     """
 
     def __init__(self, config: pytest.Config) -> None:
-        self._config, self._ledger = config, config.stash[LEDGER]
+        self._config, self._usage = config, config.stash[USAGE]
         self._unused: list[str] = []
 
     def pytest_itemcollected(self, item: pytest.Item) -> None:
-        """Note a test."""
+        """Record a test."""
         uses = not FIXTURES.isdisjoint(getattr(item, "fixturenames", ()))
-        self._ledger.tests[item.nodeid] = (str(item.path), uses)
+        self._usage.tests[item.nodeid] = (str(item.path), uses)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Note a file that was collected, and what could not be."""
+        """Record a collected file, or that collecting failed."""
         if report.failed:
-            self._ledger.broken = True
+            self._usage.broken = True
         elif report.passed and "::" not in report.nodeid:
-            self._ledger.files.add(str(self._config.rootpath / report.nodeid))
+            self._usage.files.add(str(self._config.rootpath / report.nodeid))
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, Any, Any]:
-        """Fail a test that renewed files, once all of it has run."""
+        """Fail a test that renewed files, after all of it has run."""
         result = yield
-        renewed = self._ledger.renewed.get(item.nodeid)
+        renewed = self._usage.renewed.get(item.nodeid)
         if renewed:
             pytest.fail("\n".join(renewed), pytrace=False)
         return result
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note what became of a test; one that was skipped may have used more elsewhere."""
+        """Record whether a test failed or is complete; a skipped test may use more elsewhere."""
         node = report.nodeid
-        uses = self._ledger.tests.get(node, ("", False))[1]
+        uses = self._usage.tests.get(node, ("", False))[1]
         if report.failed:
-            self._ledger.failed.add(node)
+            self._usage.failed.add(node)
         ended = report.when == "call" or (report.when == "setup" and not report.passed)
         if ended and (not uses or (report.when == "call" and report.passed)):
-            self._ledger.settled.add(node)
+            self._usage.completed.add(node)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
-        """Add up a worker of pytest-xdist; one that crashed sends nothing, and settles nothing."""
-        self._ledger.add(getattr(node, "workeroutput", {}).get(_OUTPUT, {}))
+        """Add the usage of a worker of pytest-xdist; one that crashed sends nothing."""
+        self._usage.add(getattr(node, "workeroutput", {}).get(_OUTPUT, {}))
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Find what is unused; a worker hands over its ledger."""
+        """Find unused files; a worker sends its usage instead."""
         if hasattr(self._config, "workeroutput"):
-            self._config.workeroutput[_OUTPUT] = self._ledger.dump()
+            self._config.workeroutput[_OUTPUT] = self._usage.dump()
             return
-        # `--lf` leaves out tests before anybody hears of them.
-        if self._ledger.concerned and not self._config.getoption("lf", False):
-            self._unused = self._ledger.unused(self._whole)
+        # `--lf` removes tests before they are collected.
+        if self._usage.any_test and not self._config.getoption("lf", False):
+            self._unused = self._usage.unused(self._is_complete)
         if self._unused and self._strict and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Tell what was renewed, and what is unused."""
-        renewed = [line for lines in self._ledger.renewed.values() for line in lines]
+        """Print what was renewed and what is unused."""
+        renewed = [line for lines in self._usage.renewed.values() for line in lines]
         if not renewed and not self._unused:
             return
         terminalreporter.section("brrt")
@@ -100,13 +100,13 @@ class Watch:
         chosen = self._config.getoption("brrt_unused") or self._config.getini("brrt_unused")
         return bool(chosen == "fail")
 
-    def _whole(self, folder: str, files: Iterable[str]) -> bool:
-        """Whether all test files that could use a folder were asked for, as a whole, and read."""
-        if self._ledger.folder:
+    def _is_complete(self, folder: str, files: Iterable[str]) -> bool:
+        """Whether all test files that could use a folder were requested and collected."""
+        if self._usage.folder:
             here = self._config.rootpath
             roots = [str(here / each) for each in self._config.getini("testpaths")] or [str(here)]
-            left_out = any(self._config.getoption(name, None) for name in ("ignore", "ignore_glob"))
-            return not left_out and all(map(self._asked_for, roots))
+            ignoring = any(self._config.getoption(name, None) for name in ("ignore", "ignore_glob"))
+            return not ignoring and all(map(self._is_requested, roots))
         patterns = self._config.getini("python_files")
         beside = os.path.dirname(folder)
         expected = {
@@ -114,10 +114,10 @@ class Watch:
             for name in os.listdir(beside)
             if any(fnmatch(name, pattern.rpartition("/")[2]) for pattern in patterns)
         }
-        return expected <= set(files) and all(map(self._asked_for, expected))
+        return expected <= set(files) and all(map(self._is_requested, expected))
 
-    def _asked_for(self, path: str) -> bool:
-        """Whether a path, or a folder above it, was given to pytest as a whole."""
+    def _is_requested(self, path: str) -> bool:
+        """Whether a path, or a folder above it, is an argument of pytest."""
         here = str(self._config.invocation_params.dir)
         given = [os.path.normpath(os.path.join(here, arg)) for arg in self._config.args]
         return any(path == each or path.startswith(each.rstrip(os.sep) + os.sep) for each in given)
