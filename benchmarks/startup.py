@@ -10,6 +10,7 @@ kernels in their caches. `brrt replay run.mcap --json` must stay below 2.0.
 """
 
 import argparse
+import os
 import resource
 import shlex
 import statistics
@@ -33,8 +34,9 @@ COMMANDS = {
 
 def processor_time(command: list[str], folder: Path) -> float:
     """Return the seconds of processor time, user plus system, that a command takes."""
+    env = {name: text for name, text in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(command, cwd=folder, env=env, stdout=subprocess.DEVNULL, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
