@@ -1,78 +1,90 @@
-"""The `brrt` command: its commands, and how errors become one line."""
+"""The `brrt` command: the table of its commands, and errors as one line."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
+from typing import Any
 
 import typer
+from typer.main import get_command
 
+from .command import Command, Group
 from .console import Code, complain
-from .diff import diff
-from .explain import explain
-from .export import export
-from .lists import planners, robots
-from .plan import plan
-from .plot import plot
-from .recover import recover
-from .replay import replay
-from .saved import naming_runs
-from .verify import verify
-from .view import view
-from .worlds import app as worlds
+
+_COMMANDS = {
+    "plan": "plan",
+    "replay": "replay",
+    "plot": "plot",
+    "verify": "verify",
+    "diff": "diff",
+    "explain": "explain",
+    "export": "export",
+    "view": "view",
+    "recover": "recover",
+    "planners": "lists",
+    "robots": "lists",
+    "worlds": "worlds",
+}
+"""The module of each command. It is imported when the command runs, or for the list of all."""
+
+
+class _Commands(Mapping[str, Any]):
+    """The commands by name: a function of that name, or the module's `app` if it has one."""
+
+    def __getitem__(self, name: str) -> Any:
+        module = import_module(f".{_COMMANDS[name]}", __package__)
+        app = getattr(module, "app", None)
+        if app is None:
+            app = typer.Typer(add_completion=False)
+            app.command(name, cls=Command)(getattr(module, name))
+        return get_command(app)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_COMMANDS)
+
+    def __len__(self) -> int:
+        return len(_COMMANDS)
+
+
+class _Brrt(Group):
+    """The group of all commands."""
+
+    def __init__(self, *args: Any, **given: Any) -> None:
+        super().__init__(*args, **given)
+        self.commands: Any = _Commands()
+
 
 app = typer.Typer(
     name="brrt",
+    cls=_Brrt,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="""The flight recorder for motion planners.
-
-Run a planner, record every sample, rejection, edge and path with its time, look inside, replay.
-
-[bold]brrt plan[/bold] plans in a random world and writes run.mcap and run.rrd
-
-[bold]brrt replay run.mcap[/bold] rebuilds the run's figures and trees from the file alone
-
-[bold]brrt verify run.mcap[/bold] proves what the planner promises: free, in bounds, costs right
-
-[bold]brrt diff a.mcap b.mcap[/bold] compares two runs, and says where they part
-
-
-[bold]brrt explain run.mcap[/bold] says why it failed, or took long, and what to try
-
-[bold]brrt view run.mcap[/bold] shows the tree as it grows
-
-[bold]brrt export run.mcap --foxglove viz.mcap[/bold] writes it for Foxglove and Lichtblick
-
-[bold]brrt recover cut.mcap --out whole.mcap[/bold] saves what a killed run left
-
-[bold]brrt planners[/bold] lists what there is to set
-
-Exit codes: 0 solved, equal, holds; 1 no path, differs, broken; 2 bad input; 130 Ctrl-C,
-143 SIGTERM, 129 a closed terminal: the files are whole all the same.""",
 )
-
-app.command()(plan)
-app.command()(naming_runs(replay))
-app.command()(naming_runs(plot))
-app.command()(verify)
-app.command()(diff)
-app.command()(naming_runs(explain))
-app.command()(naming_runs(export))
-app.command()(naming_runs(view))
-app.command()(recover)
-app.command()(planners)
-app.command()(robots)
-app.add_typer(worlds, name="worlds")
 
 
 @app.callback(invoke_without_command=True)
 def options(
-    version: bool = typer.Option(False, "--version", help="Print the version and leave."),
+    version: bool = typer.Option(False, "--version", help="Print the version and exit."),
 ) -> None:
-    """See the help of `app`."""
+    """The flight recorder for motion planners.
+
+    Run a planner and record every sample, rejection, edge and path with its time.
+    Then replay the recording, verify it, compare, explain and draw it, from the file alone.
+
+    A first tour:
+      [bold]brrt plan[/bold]              plan in a random world, write run.mcap and run.rrd
+      [bold]brrt replay run.mcap[/bold]   the metrics and the trees of the run
+      [bold]brrt verify run.mcap[/bold]   check the run against what its planner promises
+      [bold]brrt view run.rrd[/bold]      watch the trees grow
+
+    Exit codes: 0 solved, equal, verified; 1 no path, different, a rule is broken;
+    2 bad input; 130 Ctrl-C, 143 SIGTERM, 129 terminal closed. After a signal the files
+    are complete up to that moment.
+    """
     if version:
-        from importlib.metadata import version as version_of  # noqa: PLC0415
+        from importlib.metadata import version as version_of
 
         typer.echo(version_of("brrt"))
         raise typer.Exit
@@ -86,12 +98,10 @@ def main(args: Sequence[str] | None = None) -> None:
 def _run(args: Sequence[str] | None) -> int:
     try:
         return int(app(args, prog_name="brrt", standalone_mode=False) or 0)
-    except typer.Abort:
-        return Code.INTERRUPTED
-    except KeyboardInterrupt:
+    except (typer.Abort, KeyboardInterrupt):
         return Code.INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has gone: nothing more to say, and nothing to say it to.
+        # The reader of our output has closed it: there is nothing more to print.
         sys.stdout = None
         return Code.FAILED
     except Exception as error:
@@ -100,7 +110,7 @@ def _run(args: Sequence[str] | None) -> int:
         if usage is not None:
             complain(f"{usage()} (see brrt --help)")
             return Code.BAD_INPUT
-        from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+        from brrt.errors import BrrtError
 
         if not isinstance(error, BrrtError):
             raise

@@ -59,7 +59,7 @@ def _panel(
     world: "World", axes: tuple[int, int], columns: int, rows: int, *, blocks: bool
 ) -> list[Text]:
     """Draw a world in a frame, seen along the third axis if there is one."""
-    from brrt.views.colours import GOAL, START  # noqa: PLC0415 - keep --help fast
+    from brrt.views.colours import GOAL, START
 
     size = (world.upper - world.lower)[list(axes)]
     # A character is about twice as high as wide: it contains two pixels, one above the other.
@@ -95,7 +95,7 @@ def _panel(
 
 def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "Floats":
     """Return the covered share of each pixel, rows from below; shape (height, width)."""
-    from brrt.worlds.free_space import occupied  # noqa: PLC0415 - keep --help fast
+    from brrt.worlds.free_space import occupied
 
     counts = dict(zip(axes, (width * _SAMPLES, height * _SAMPLES), strict=True))
     if world.dim == 3:
@@ -115,9 +115,9 @@ def _shares(world: "World", axes: tuple[int, int], width: int, height: int) -> "
 
 def _thin(world: "World", width: int, height: int) -> "NDArray[np.bool_]":
     """Return which pixels an obstacle touches that is thinner than the points' distance."""
-    from brrt.worlds import World  # noqa: PLC0415
-    from brrt.worlds.obstacle_arrays import obstacle_arrays  # noqa: PLC0415
-    from brrt.worlds.rasterize import Raster  # noqa: PLC0415
+    from brrt.worlds import World
+    from brrt.worlds.obstacle_arrays import obstacle_arrays
+    from brrt.worlds.rasterize import Raster
 
     cell = (world.upper - world.lower) / (width, height)
     least = float(cell.min()) / _SAMPLES

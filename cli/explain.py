@@ -1,57 +1,46 @@
-"""`brrt explain`: why a run failed, or took long."""
+"""`brrt explain`: why a run failed or took long."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .console import note, out, print_json, print_lines
-from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
-from .saved import Saved, opened
+from .console import print_json, print_line, print_lines
+from .options import Accepted, At, AtEvent, AtIteration, Run, instant
 
 
 def explain(
-    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
+    run: Run,
     at: At = None,
     at_event: AtEvent = None,
     at_iteration: AtIteration = None,
-    partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
-    ] = False,
+    _partial: Accepted = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object with every figure.")
     ] = False,
 ) -> None:
-    """Say why a run failed, or took long, by figures from its recording, and what to try.
+    """Explain why a run failed or took long, from its recording alone, and what to try next.
 
-    Shares of the free space are counted in coarse cells, 16 x 16 or 8 x 8 x 8.
-    Widths are those of the widest way from start to goal, at its narrowest
-    place, measured in cells. Each command writes a file of its own, here.
+    Shares of the free space are counted on a coarse grid of 16 x 16 or 8 x 8 x 8 cells.
+    The width of a passage is measured on such cells too, at the narrowest place of the
+    widest way from start to goal. Each proposed command writes a file of its own here.
 
-    brrt explain run.mcap
-
-    brrt explain run.mcap --at-iteration 400
-
-    brrt explain run.mcap --json
+    Examples:
+      brrt explain run.mcap
+      brrt explain run.mcap --at-iteration 400
+      brrt explain run.mcap --json
     """
-    from dataclasses import replace  # noqa: PLC0415
+    from brrt.explanation import explain as explained
+    from brrt.replay.snapshot import Snapshot
 
-    from brrt.explanation import explain as explained  # noqa: PLC0415
-    from brrt.replay.snapshot import Snapshot  # noqa: PLC0415
+    from .run_file import open_run
 
     limits = instant(at, at_event, at_iteration)
-    recording = opened(run, partial=partial)
-    batches = Counted(Saved(recording, partial=partial, verb="explain them"))
-    moment = Snapshot(replace(recording, batches=lambda: iter(batches)), limits)
-    found = explained(moment, str(run))
-    late = beyond(limits, batches.count, batches.last)
-    if late is not None:
-        note(f"{late}; this is how it stood then")
+    found = explained(Snapshot(open_run(run, limits, partial=True), limits), str(run))
     if as_json:
         print_json(found.as_dict())
         return
     print_lines(found.table())
-    for i, advice in enumerate(found.advice):
-        print_lines(["", *advice.reason(i + 1)])
+    for number, advice in enumerate(found.advice, 1):
+        print_lines(["", *advice.reason(number)])
         for line in advice.command_lines():
-            out.print(line, style="bold", markup=False, soft_wrap=True)
+            print_line(line, style="bold")

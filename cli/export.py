@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
-from .console import Watch, out
-from .saved import Saved, opened
+from .console import print_line
+from .options import Accepted, Force, Run
+from .progress import ProgressBar
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
+    run: Run,
     foxglove: Annotated[
         Path | None,
         typer.Option(
@@ -23,18 +24,18 @@ def export(
         Path | None,
         typer.Option(help="Write a layout to import there, a .json file.", metavar="LAYOUT"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite files.")] = False,
-    partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
-    ] = False,
+    force: Force = False,
+    _partial: Accepted = False,
 ) -> None:
     """Write a run in a format of other viewers.
 
-    brrt export run.mcap --foxglove viz.mcap --layout layout.json
+    Examples:
+      brrt export run.mcap --foxglove viz.mcap --layout layout.json
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError
 
-    from .outputs import check_output  # noqa: PLC0415
+    from .output_file import check_output
+    from .run_file import open_run
 
     if foxglove is None:
         raise BrrtError("nothing to export to; name a file with --foxglove OUT.mcap")
@@ -42,10 +43,10 @@ def export(
     check_output(layout, "--layout", ".json", force=force)
     if foxglove.exists() and run.exists() and foxglove.samefile(run):
         raise BrrtError(f"--foxglove {foxglove}: is the recording; choose another name")
-    recording = opened(run, partial=partial)
-    with Watch(None, "reading the recording").running() as watch:
-        batches = list(Saved(recording, partial=partial, verb="export them"))
-        from brrt.views.foxglove.export import export as export_to_foxglove  # noqa: PLC0415
+    recording = open_run(run, partial=True)
+    with ProgressBar(None, "reading the recording").running() as watch:
+        batches = list(recording.batches())
+        from brrt.views.foxglove.export import export as export_to_foxglove
 
         watch.total = 1.0
         count = export_to_foxglove(
@@ -56,4 +57,4 @@ def export(
         )
     imported = "" if layout is None else f"; import {layout} as a layout first"
     text = f"{foxglove}: {count:,} messages for Foxglove or Lichtblick{imported}"
-    out.print(text, markup=False, soft_wrap=True)
+    print_line(text)

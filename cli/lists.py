@@ -1,37 +1,46 @@
-"""`brrt planners`, `brrt robots`: what there is, and what can be set."""
+"""`brrt planners`, `brrt robots`: the registered planners and robots, and their parameters."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
 
-from .console import out, print_json, print_rows
+from .console import console, print_json, print_line, print_rows
+from .options import Json
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
-Name = Annotated[str | None, typer.Argument(help="One of them alone.", show_default=False)]
+Name = Annotated[str | None, typer.Argument(help="Show this one only.", show_default=False)]
 
 
 def planners(name: Name = None, *, as_json: Json = False) -> None:
-    """List the planners with their parameters, defaults and ranges (set by --param).
+    """List the planners with their parameters, defaults and ranges.
 
-    brrt planners
+    Set a parameter by brrt plan --param NAME=VALUE.
 
-    brrt planners rrt-star
+    Examples:
+      brrt planners
+      brrt planners rrt-star
     """
-    from brrt.planners import PLANNERS  # noqa: PLC0415 - keep --help fast
+    from brrt.planners import PLANNERS
 
-    _print("planner", dict(PLANNERS), name, as_json=as_json)
+    _print("planner", PLANNERS, name, as_json=as_json)
 
 
 def robots(name: Name = None, *, as_json: Json = False) -> None:
-    """List the robots."""
-    from brrt.robots import ROBOTS  # noqa: PLC0415
+    """List the robots with their parameters, defaults and ranges.
 
-    _print("robot", dict(ROBOTS), name, as_json=as_json)
+    Set parameters by brrt plan --robot polygon:length=4,width=2.
+
+    Examples:
+      brrt robots
+      brrt robots chain
+    """
+    from brrt.robots import ROBOTS
+
+    _print("robot", ROBOTS, name, as_json=as_json)
 
 
-def described(registry: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return for each class of a registry what it is about and what can be set."""
+def described(registry: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return what each class of a registry is, and its parameters."""
     return {
         name: {"about": (kind.__doc__ or "").split("\n")[0], "params": kind.describe()}
         for name, kind in registry.items()
@@ -39,12 +48,12 @@ def described(registry: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def chosen(what: str, name: str | None, entries: dict[str, Any]) -> dict[str, Any]:
-    """Return all entries, or the one that was asked for.
+    """Return all entries, or the named one alone.
 
     Raises:
-        BrrtError: There is no such one.
+        BrrtError: There is no entry of that name.
     """
-    from brrt.errors import unknown  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import unknown
 
     if name is None:
         return entries
@@ -54,17 +63,19 @@ def chosen(what: str, name: str | None, entries: dict[str, Any]) -> dict[str, An
 
 
 def print_described(entries: dict[str, dict[str, Any]]) -> None:
-    """Print them as tables."""
+    """Print entries as tables."""
+    from rich.markup import escape
+
     for name, entry in entries.items():
-        out.print(f"[bold]{name}[/bold]  {escape(entry['about'])}")
+        console().print(f"[bold]{name}[/bold]  {escape(entry['about'])}")
         if entry["params"]:
             rows = [{**row, "name": f"  {row['name']}"} for row in entry["params"]]
             units = any(row["unit"] for row in rows)
             print_rows([{k: v for k, v in row.items() if units or k != "unit"} for row in rows])
-        out.print()
+        print_line()
 
 
-def _print(what: str, registry: dict[str, Any], name: str | None, *, as_json: bool) -> None:
+def _print(what: str, registry: Mapping[str, Any], name: str | None, *, as_json: bool) -> None:
     entries = chosen(what, name, described(registry))
     if as_json:
         print_json(entries)

@@ -8,9 +8,9 @@ from brrt.replay.text import counted, seconds, vector
 from .console import print_json, print_pairs
 
 if TYPE_CHECKING:
+    from brrt.recording import Limits, Recording
     from brrt.replay.cell_history import CellHistory
     from brrt.replay.node_history import NodeHistory, When
-    from brrt.replay.snapshot import Snapshot
 
 _SHOWN = 5
 """Events of a kind that are listed: the first ones, and the last."""
@@ -26,7 +26,7 @@ def tree_number(tree: str | None) -> int:
     Raises:
         BrrtError: The text is neither.
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError
 
     if tree is None:
         return 0
@@ -35,15 +35,18 @@ def tree_number(tree: str | None) -> int:
     return _TREES[tree] if tree in _TREES else int(tree)
 
 
-def show_node(moment: "Snapshot", node: int, tree: int, *, as_json: bool) -> None:
-    """Print a node's history up to an instant, or a cell's.
+def print_node(
+    recording: "Recording", limits: "Limits", node: int, tree: int, *, as_json: bool
+) -> None:
+    """Print the history of a node, or of a cell, up to an instant.
 
     Raises:
         BrrtError: The node does not exist.
     """
-    from brrt.replay.node_history import NodeHistory  # noqa: PLC0415
+    from brrt.replay.node_history import NodeHistory
+    from brrt.replay.snapshot import Snapshot
 
-    found = moment.node(node, tree)
+    found = Snapshot(recording, limits).node(node, tree)
     if as_json:
         print_json(found.as_dict())
         return
@@ -52,7 +55,7 @@ def show_node(moment: "Snapshot", node: int, tree: int, *, as_json: bool) -> Non
 
 
 def _of_node(h: "NodeHistory") -> Rows:
-    from brrt.replay.node_history import tree_name  # noqa: PLC0415
+    from brrt.replay.node_history import tree_name
 
     yield "node", f"{h.node:,} of {tree_name(h.tree)} at {vector(h.q)}"
     parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"
@@ -108,8 +111,7 @@ def _rejects(h: "NodeHistory") -> Rows:
 
 def _of_cell(h: "CellHistory") -> Rows:
     yield "cell", f"{h.cell:,} at {vector(h.q)}, {h.distance:.6g} from the goal"
-    times = counted(len(h.looks), "time")
-    yield "expanded", times
+    yield "expanded", counted(len(h.looks), "time")
     yield from _listed(
         "",
         [

@@ -3,23 +3,28 @@
 import shlex
 import signal
 import sys
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.markup import escape
 
-from .console import SIGNALLED, Code, Watch, note, out, print_json, print_summary, tell_of_compiling
-from .instants import At, AtEvent, AtIteration, instant
-from .numbers import whole_number
+from .console import SIGNALLED, Code, announce_compilation, console, note, print_json
+from .options import At, AtEvent, AtIteration, instant
+from .progress import ProgressBar
 from .signals import stop_on_signals
 
 if TYPE_CHECKING:
     from brrt.recording import Sink
     from brrt.replay.metrics import Metrics
     from brrt.runs.run import Run
-    from brrt.scenario.scenario import Scenario
+
+
+def _option(*names: str, panel: str, **given: Any) -> Any:
+    return typer.Option(*names, rich_help_panel=panel, show_default=False, **given)
+
+
+_POINT = "X,Y[,Z]"
 
 
 def plan(
@@ -28,225 +33,163 @@ def plan(
     ] = None,
     world: Annotated[
         str | None,
-        typer.Option(
-            help="A generator with parameters, as circles2d:n=80,seed=3, or a file. "
-            "Default circles2d; brrt worlds lists them.",
-            rich_help_panel="Problem",
+        _option(
+            panel="Problem",
+            help="A generator with parameters, such as circles2d:n=80,seed=3, or a file. "
+            "Default circles2d; listed by brrt worlds.",
         ),
     ] = None,
     robot: Annotated[
         str | None,
-        typer.Option(
-            help="A robot with parameters, as polygon:length=4,width=2, or a file. "
-            "Default point; brrt robots lists them.",
-            rich_help_panel="Problem",
+        _option(
+            panel="Problem",
+            help="A robot with parameters, such as polygon:length=4,width=2, or a file. "
+            "Default point; listed by brrt robots.",
         ),
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(
-            help="Start configuration, as 5,5 or 1,2,3, or random: a free one, from the seed.",
-            metavar="X,Y[,Z]",
-            rich_help_panel="Problem",
+        _option(
+            panel="Problem",
+            metavar=_POINT,
+            help="Start configuration, such as 5,5; or random: a free one drawn from the seed. "
+            "Default: the world's.",
         ),
     ] = None,
     goal: Annotated[
         str | None,
-        typer.Option(
-            help="Goal configuration, or random.", metavar="X,Y[,Z]", rich_help_panel="Problem"
-        ),
+        _option(panel="Problem", metavar=_POINT, help="Goal configuration, or random."),
     ] = None,
     planner: Annotated[
-        str | None,
-        typer.Option(help="Default rrt; brrt planners lists them.", rich_help_panel="Planner"),
+        str | None, _option(panel="Planner", help="Default rrt; listed by brrt planners.")
     ] = None,
     param: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A planner's parameter, as step=2; may be repeated.",
+        _option(
+            panel="Planner",
             metavar="NAME=VALUE",
-            rich_help_panel="Planner",
+            help="A parameter of the planner, such as step=2; may be repeated.",
         ),
     ] = None,
     seed: Annotated[
-        int | None,
-        typer.Option(help="Seed of every random draw. Default 0.", rich_help_panel="Planner"),
+        int | None, _option(panel="Planner", help="Seed of all random draws. Default 0.")
     ] = None,
     iterations: Annotated[
         int | None,
-        typer.Option(
-            help="Iterations before giving up, as 5000 or 1e6. Default: the planner's own; with "
-            "--time, no limit.",
-            parser=whole_number,
-            metavar="INTEGER",
-            rich_help_panel="Planner",
+        _option(
+            panel="Planner",
+            help="Limit on iterations, such as 5000 or 1e6. Default: the planner's own, or none "
+            "with --time.",
         ),
     ] = None,
     time: Annotated[
-        float | None,
-        typer.Option(help="Seconds before giving up. Default none.", rich_help_panel="Planner"),
+        float | None, _option(panel="Planner", help="Limit on seconds. Default none.")
     ] = None,
     smooth: Annotated[
         bool | None,
-        typer.Option(
-            "--smooth/--no-smooth",
-            help="Shortcut the path. Default yes.",
-            rich_help_panel="Planner",
-            show_default=False,
-        ),
+        _option("--smooth/--no-smooth", panel="Planner", help="Shortcut the path. Default yes."),
     ] = None,
     shortcuts: Annotated[
-        int | None,
-        typer.Option(help="Attempts of the smoother. Default 100.", rich_help_panel="Planner"),
+        int | None, _option(panel="Planner", help="Attempts to shortcut the path. Default 100.")
     ] = None,
     execute: Annotated[
         bool | None,
-        typer.Option(
+        _option(
             "--execute/--no-execute",
-            help="Drive the path in moves, one in each deadline. Default no.",
-            rich_help_panel="Real time",
-            show_default=False,
+            panel="Real time",
+            help="Follow the path in moves, one in each deadline. Default no.",
         ),
     ] = None,
     max_move: Annotated[
-        float | None,
-        typer.Option(help="Longest move. Default 1.", rich_help_panel="Real time"),
+        float | None, _option(panel="Real time", help="Length of a move at most. Default 1.")
     ] = None,
     deadline: Annotated[
-        float | None,
-        typer.Option(help="Seconds for each move. Default 2.", rich_help_panel="Real time"),
+        float | None, _option(panel="Real time", help="Seconds for each move. Default 2.")
     ] = None,
     mcap: Annotated[
         Path | None,
-        typer.Option(
+        _option(
             "--out",
-            help="Write the MCAP recording here. Default run.mcap (branch.mcap with --from), with "
-            "run.rrd beside it, where neither --out nor --rrd is given.",
-            rich_help_panel="Recording",
+            panel="Recording",
+            help="Write the MCAP recording here. Default run.mcap (branch.mcap with --from) and "
+            "run.rrd beside it, if neither --out nor --rrd is given.",
         ),
     ] = None,
     rrd: Annotated[
-        Path | None,
-        typer.Option(help="Write the Rerun recording here.", rich_help_panel="Recording"),
+        Path | None, _option(panel="Recording", help="Write the Rerun recording here.")
     ] = None,
     record: Annotated[
-        bool, typer.Option("--record/--no-record", help="Write files.", rich_help_panel="Recording")
+        bool, _option("--record/--no-record", panel="Recording", help="Write files. Default yes.")
     ] = True,
     force: Annotated[
-        bool, typer.Option("--force", help="Overwrite files.", rich_help_panel="Recording")
+        bool, _option("--force", panel="Recording", help="Overwrite existing files.")
     ] = False,
     view: Annotated[
-        bool,
-        typer.Option(
-            "--view", help="Watch it live in the Rerun viewer.", rich_help_panel="Recording"
-        ),
+        bool, _option("--view", panel="Recording", help="Watch the run live in the Rerun viewer.")
     ] = False,
+    clock: Annotated[
+        str | None,
+        _option(
+            panel="Recording",
+            help="real, or logical: event n at n us, so that equal runs write equal files. "
+            "Default real.",
+        ),
+    ] = None,
     parent: Annotated[
         Path | None,
-        typer.Option(
+        _option(
             "--from",
-            help="Go on from this recording, from the end of planning or from the instant below, "
-            "with other parameters, seed, budget, smoothing or moves; what is not given stays. "
-            "Budgets count from the start of the recording.",
+            panel="Branch",
             metavar="RUN",
-            rich_help_panel="Branch",
+            help="Continue this recording from the end of planning, or from the instant below, "
+            "with other parameters, seed, limits, smoothing or moves. Settings that are not given "
+            "stay. Limits count from the start of the recording.",
         ),
     ] = None,
     at: At = None,
     at_event: AtEvent = None,
     at_iteration: AtIteration = None,
-    clock: Annotated[
-        str | None,
-        typer.Option(
-            help="real, or logical: event n at n us, so that the file is the same in each run.",
-            rich_help_panel="Recording",
-        ),
-    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object instead of the summary.")
     ] = False,
 ) -> None:
     """Run a planner in a world and record every event.
 
-    brrt plan
-
-    brrt plan --world squares2d:n=120,seed=4 --seed 7 --param step=2 --out seven.mcap
-
-    brrt plan --world map.txt --start 0,0,1 --goal 12,12,5 --time 10 --view
-
-    brrt plan experiment.toml --seed 3 --json
-
-    brrt plan --from run.mcap --at-iteration 100 --param step=2
+    Examples:
+      brrt plan
+      brrt plan --world squares2d:n=120 --seed 7 --param step=2 --out seven.mcap
+      brrt plan --world map.txt --start 0,0,1 --goal 12,12,5 --time 10 --view
+      brrt plan experiment.toml --seed 3 --json
+      brrt plan --from run.mcap --at-iteration 100 --param step=2
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.runs.run import Run  # noqa: PLC0415
-
-    from .outputs import check_display, check_output  # noqa: PLC0415
-
-    if not record and (mcap or rrd):
-        raise BrrtError("--no-record contradicts --out and --rrd; leave one of them out")
     limits = instant(at, at_event, at_iteration)
-    if limits and parent is None:
-        raise BrrtError(
-            "--at, --at-event and --at-iteration say where to branch --from a recording"
-        )
-    if record and mcap is None and rrd is None:
-        name = "run" if parent is None else "branch"
-        mcap, rrd = Path(f"{name}.mcap"), Path(f"{name}.rrd")
-    check_output(mcap, "--out", ".mcap", force=force)
-    check_output(rrd, "--rrd", ".rrd", force=force)
-    check_display(view=view)
     given = {
         "world": world, "robot": robot, "start": start, "goal": goal, "planner": planner,
         "seed": seed, "iterations": iterations, "time": time, "smooth": smooth,
         "shortcuts": shortcuts, "execute": execute, "max_move": max_move, "deadline": deadline,
         "clock": clock,
     }  # fmt: skip
-    wanted = {name: value for name, value in given.items() if value is not None}
-    if parent is None:
-        settings = _merged(scenario, wanted, param or [])
-        prepare = partial(Run, settings)
-    else:
-        from .branch import check_parent, go_on  # noqa: PLC0415
-
-        check_parent(parent, scenario, mcap, rrd)
-        prepare = partial(go_on, parent, limits, wanted, _params(param or []))
-    tell_of_compiling()
-    with Watch(iterations, "preparing the planner").running() as watch:
-        run = prepare()
-        for line in run.problem.world.notes:
-            note(line)
-        watch.total = None if run.stop.time_s is not None else run.stop.iterations
-        with stop_on_signals(run.stop):
-            metrics = run.execute(_sinks(run, mcap, rrd, view=view), lambda m: _show(m, watch))
-    try:
-        _report(metrics, mcap, rrd, as_json=as_json)
-    except OSError:
-        if run.stop.signal != signal.SIGHUP:
-            raise
-        sys.stdout = None  # nobody is left to read it: the terminal was closed
+    settings = {name: value for name, value in given.items() if value is not None}
+    mcap, rrd = _outputs(mcap, rrd, parent, record=record, force=force, view=view)
+    _check_branch(parent, limits, scenario, mcap, rrd)
+    params = _params(param or [])
+    announce_compilation()
+    with ProgressBar(iterations, "preparing the planner").running() as bar:
+        if parent is None:
+            run = _new_run(scenario, settings, params)
+        else:
+            run = _branched_run(parent, limits, settings, params)
+        metrics = _execute(run, _sinks(run, mcap, rrd, view=view), bar)
+    _report(run, metrics.as_dict(), mcap, rrd, as_json=as_json)
     if run.stop.interrupted:
         raise typer.Exit(SIGNALLED + run.stop.signal)
     if not metrics.solved:
         raise typer.Exit(Code.FAILED)
 
 
-def _merged(file: Path | None, given: dict[str, Any], params: list[str]) -> "Scenario":
-    """Put what was given on the command line on top of the file, if there is one."""
-    from brrt.planners import check_params, load_scenario  # noqa: PLC0415
-    from brrt.scenario.scenario import Scenario  # noqa: PLC0415
-
-    base = Scenario() if file is None else load_scenario(file)
-    values = {**base.as_dict(), **given}
-    if values["planner"] != base.planner:
-        values["params"] = {}
-    values["params"] = {**values["params"], **_params(params)}
-    return check_params(Scenario.parse(values))
-
-
 def _params(texts: list[str]) -> dict[str, str]:
-    """Read the planner's parameters."""
-    from brrt.errors import BrrtError  # noqa: PLC0415
+    """Split the planner's parameters into names and values."""
+    from brrt.errors import BrrtError
 
     found = {}
     for text in texts:
@@ -257,42 +200,161 @@ def _params(texts: list[str]) -> dict[str, str]:
     return found
 
 
+def _outputs(
+    mcap: Path | None,
+    rrd: Path | None,
+    parent: Path | None,
+    *,
+    record: bool,
+    force: bool,
+    view: bool,
+) -> tuple[Path | None, Path | None]:
+    """Return the files to write.
+
+    Raises:
+        BrrtError: One of them cannot be written, or the options contradict each other.
+    """
+    from brrt.errors import BrrtError
+
+    from .output_file import check_display, check_output
+
+    if not record and (mcap or rrd):
+        raise BrrtError("--no-record contradicts --out and --rrd; leave one of them out")
+    if record and mcap is None and rrd is None:
+        name = "run" if parent is None else "branch"
+        mcap, rrd = Path(f"{name}.mcap"), Path(f"{name}.rrd")
+    check_output(mcap, "--out", ".mcap", force=force)
+    check_output(rrd, "--rrd", ".rrd", force=force)
+    check_display(view=view)
+    return mcap, rrd
+
+
+def _check_branch(
+    parent: Path | None, limits: Mapping[str, int], scenario: Path | None, *outputs: Path | None
+) -> None:
+    """Raise if the options of a branch contradict each other, or if it would overwrite its parent.
+
+    Raises:
+        BrrtError: They do.
+    """
+    from brrt.errors import BrrtError
+
+    if parent is None:
+        if limits:
+            raise BrrtError(
+                "--at, --at-event and --at-iteration say where to branch; add --from RUN"
+            )
+        return
+    if scenario is not None:
+        raise BrrtError(f"--from continues the recorded scenario; leave out {scenario}")
+    for path in outputs:
+        if path is not None and path.exists() and parent.exists() and path.samefile(parent):
+            raise BrrtError(f"{path} is the recording that --from continues; choose another name")
+
+
+def _new_run(file: Path | None, settings: dict[str, Any], params: dict[str, str]) -> "Run":
+    """Prepare a run of the file's scenario, if there is a file, changed by the options."""
+    from brrt.planners import check_params, load_scenario
+    from brrt.runs.run import Run
+    from brrt.scenario.scenario import Scenario
+
+    base = Scenario() if file is None else load_scenario(file)
+    values = {**base.as_dict(), **settings}
+    kept = values["params"] if values["planner"] == base.planner else {}
+    return Run(check_params(Scenario.parse({**values, "params": {**kept, **params}})))
+
+
+def _branched_run(
+    parent: Path, limits: Mapping[str, int], settings: dict[str, Any], params: dict[str, str]
+) -> "Run":
+    """Prepare a run that continues a recording, and report from where.
+
+    Raises:
+        BrrtError: The recording cannot be continued there, or not with these settings.
+    """
+    from brrt.errors import RecordingError
+    from brrt.formats import BrokenError, read
+    from brrt.runs.branch import BranchedRun, last_complete_iteration
+
+    seed = settings.pop("seed", None)
+    try:
+        run = BranchedRun(read(parent), params=params, seed=seed, settings=settings, **limits)
+    except BrokenError as error:
+        last, _ = last_complete_iteration(read(parent, partial=True).batches(), {})
+        if last < 0:
+            raise RecordingError(f"{error.fault}; no iteration of planning is whole") from None
+        raise RecordingError(
+            f"{error.fault}; it is whole as far as iteration {last:,}: branch there at the latest "
+            f"(--at-iteration {last})"
+        ) from None
+    here = run.manifest.branches[-1]
+    note(
+        f"continues {parent} after iteration {here.iteration:,}; the {here.events:,} events up to "
+        "there were planned again and equal the recorded ones"
+    )
+    return run
+
+
 def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> list["Sink"]:
-    from brrt.formats import McapSink  # noqa: PLC0415
-    from brrt.formats.background import BackgroundSink  # noqa: PLC0415
+    from brrt.formats import McapSink
+    from brrt.formats.background import BackgroundSink
 
     world, sinks = run.problem.world, list["Sink"]()
     if mcap is not None:
         sinks.append(BackgroundSink(McapSink(mcap, run.manifest, world)))
     if rrd is not None or view:
-        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
+        from brrt.views.rerun.sink import RerunSink
 
         sinks.append(BackgroundSink(RerunSink(run.manifest, world, path=rrd, view=view)))
     return sinks
 
 
-def _show(metrics: "Metrics", watch: Watch) -> None:
-    figures = metrics.as_dict()
-    cost = "" if figures["path_cost"] is None else f", cost {figures['path_cost']:.4g}"
-    watch.update(
-        metrics.iterations,
-        figures["planner"],
-        f"{metrics.iterations:,} iterations, {figures['nodes']:,} nodes{cost}",
-    )
+def _execute(run: "Run", sinks: list["Sink"], bar: ProgressBar) -> "Metrics":
+    """Run until the end or a signal."""
+
+    def show(metrics: "Metrics") -> None:
+        best = metrics.best_path
+        cost = "" if best is None else f", cost {best[0]:.4g}"
+        nodes = metrics.counts[Kind.EDGE]
+        figures = f"{metrics.iterations:,} iterations, {nodes:,} nodes{cost}"
+        bar.update(metrics.iterations, run.manifest.scenario.planner, figures)
+
+    from brrt.events import Kind
+
+    for line in run.problem.world.notes:
+        note(line)
+    bar.total = None if run.stop.time_s is not None else run.stop.iterations
+    with stop_on_signals(run.stop):
+        return run.execute(sinks, show)
 
 
-def _report(metrics: "Metrics", mcap: Path | None, rrd: Path | None, *, as_json: bool) -> None:
-    figures = metrics.as_dict()
-    if as_json:
-        print_json(figures)
-        return
-    print_summary(figures)
-    shown = rrd or mcap  # what is drawn already opens sooner
+def _report(
+    run: "Run", metrics: Mapping[str, Any], mcap: Path | None, rrd: Path | None, *, as_json: bool
+) -> None:
+    """Print the metrics, and the commands to open the files with."""
+    try:
+        if as_json:
+            print_json(metrics)
+        else:
+            _print_summary(metrics, mcap, rrd)
+    except OSError:
+        if run.stop.signal != signal.SIGHUP:
+            raise
+        sys.stdout = None  # the terminal was closed
+
+
+def _print_summary(metrics: Mapping[str, Any], mcap: Path | None, rrd: Path | None) -> None:
+    from rich.markup import escape
+
+    from .summary import print_summary
+
+    print_summary(metrics)
+    shown = rrd or mcap  # brrt view opens the one faster that holds a drawing
     ways = [(mcap, "look inside", "replay"), (shown, "watch it", "view")]
     for number, (path, what, command) in enumerate(way for way in ways if way[0] is not None):
         typed = escape(shlex.quote(str(path)))
         gap = "" if number else "\n"
-        out.print(
+        console().print(
             f"{gap}{escape(str(path))}: {what} with [bold]brrt {command} {typed}[/bold]",
             soft_wrap=True,
         )

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from .console import Watch, note, out
-from .instants import At, AtEvent, AtIteration, beyond, instant
-from .saved import Saved, opened
+from .console import print_line
+from .options import Accepted, At, AtEvent, AtIteration, Force, instant
+from .progress import ProgressBar
 
 if TYPE_CHECKING:
-    from brrt.recording import Recording
+    from brrt.recording import Limits, Recording
 
 PICTURES, ANIMATIONS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
 _LOOKS, _FILM = "Looks", "Animation"
@@ -96,24 +96,20 @@ def plot(
     fps: Annotated[
         float, typer.Option(help="Frames a second.", min=1, max=60, rich_help_panel=_FILM)
     ] = 20.0,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
-    partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
-    ] = False,
+    force: Force = False,
+    _partial: Accepted = False,
 ) -> None:
     """Draw a run for a paper: its trees, the cost of its best path, the time of its iterations.
 
-    brrt plot run.mcap --out tree.png
-
-    brrt plot run.mcap --out early.pdf --at-iteration 100 --rejects 200
-
-    brrt plot a.mcap b.mcap c.mcap --what cost --out costs.svg
-
-    brrt plot run.mcap --out growth.gif
+    Examples:
+      brrt plot run.mcap --out tree.png
+      brrt plot run.mcap --out early.pdf --at-iteration 100 --rejects 200
+      brrt plot a.mcap b.mcap c.mcap --what cost --out costs.svg
+      brrt plot run.mcap --out growth.gif
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError
 
-    from .outputs import check_output  # noqa: PLC0415
+    from .output_file import check_output
 
     check_output(picture, "--out", PICTURES + ANIMATIONS, force=force)
     moves = picture.suffix in ANIMATIONS
@@ -124,9 +120,9 @@ def plot(
         raise BrrtError(f"--out {picture}: an animation shows the tree of one run")
     limits = instant(at, at_event, at_iteration)
 
-    from brrt.views.matplotlib.animation import DPI, need_ffmpeg, save_animation  # noqa: PLC0415
-    from brrt.views.matplotlib.draw_world import need_matplotlib  # noqa: PLC0415
-    from brrt.views.matplotlib.figure import FigureOptions, save_plot  # noqa: PLC0415
+    from brrt.views.matplotlib.animation import DPI, need_ffmpeg, save_animation
+    from brrt.views.matplotlib.draw_world import need_matplotlib
+    from brrt.views.matplotlib.figure import FigureOptions, save_plot
 
     need_matplotlib()
     if picture.suffix == ".mp4":
@@ -135,8 +131,8 @@ def plot(
         width=width, dpi=dpi or (DPI if moves else 300), rejects=rejects,
         against=cast("Any", against), azimuth=azimuth, elevation=elevation,
     )  # fmt: skip
-    with Watch(None, "reading").running() as watch:
-        recordings = [_load(run, limits, partial=partial) for run in runs]
+    with ProgressBar(None, "reading").running() as watch:
+        recordings = [_load(run, limits) for run in runs]
         watch.update(0, "drawing", "")
         if moves:
 
@@ -149,12 +145,12 @@ def plot(
             )
         else:
             save_plot(recordings, picture, panels, options, _names(runs))
-    out.print(f"wrote {picture}", markup=False, soft_wrap=True)
+    print_line(f"wrote {picture}")
 
 
 def _panels(what: str | None) -> list[str]:
-    from brrt.errors import unknown  # noqa: PLC0415
-    from brrt.views.matplotlib.figure import PANELS  # noqa: PLC0415
+    from brrt.errors import unknown
+    from brrt.views.matplotlib.figure import PANELS
 
     if what is None:
         return []
@@ -167,17 +163,15 @@ def _panels(what: str | None) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _load(run: Path, limits: dict[str, int], *, partial: bool) -> "Recording":
+def _load(run: Path, limits: "Limits") -> "Recording":
     """Return a recording up to the instant, with its events in memory."""
-    from brrt.recording import Memory  # noqa: PLC0415 - keep --help fast
-    from brrt.replay.fold import feed  # noqa: PLC0415
+    from brrt.replay.fold import until
 
-    recording, memory = opened(run, partial=partial), Memory()
-    end = feed(Saved(recording, partial=partial, verb="draw them"), [memory], limits)
-    late = None if end is None else beyond(limits, *end)
-    if late is not None:
-        note(f"{late}; this is how it stood then")
-    return replace(recording, batches=lambda: memory.batches)
+    from .run_file import open_run
+
+    recording = open_run(run, limits, partial=True)
+    batches = list(until(recording.batches(), limits))
+    return replace(recording, batches=lambda: batches)
 
 
 def _names(runs: list[Path]) -> list[str]:

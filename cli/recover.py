@@ -7,7 +7,8 @@ import typer
 
 from brrt.replay.text import counted
 
-from .console import Code, out
+from .console import Code, print_line
+from .options import Force
 
 
 def recover(
@@ -18,7 +19,7 @@ def recover(
         Path,
         typer.Option("--out", help="The new file, .mcap or .rrd.", metavar="WHOLE"),
     ],
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+    force: Force = False,
 ) -> None:
     """Save the events before the first damage of a recording that was cut or damaged.
 
@@ -32,9 +33,9 @@ def recover(
 
     brrt recover cut.mcap --out whole.rrd
     """
-    from brrt.formats.recover import recover  # noqa: PLC0415 - keep --help fast
+    from brrt.formats.recover import recover
 
-    from .outputs import check_output  # noqa: PLC0415
+    from .output_file import check_output
 
     check_output(whole, "--out", (".mcap", ".rrd"), force=force)
     found = recover(cut, whole)
@@ -47,6 +48,6 @@ def recover(
         text = f"{found.lost}; {whole} holds what is whole: {events}; anything later is lost"
     else:
         text = f"{found.lost}; no event is whole: {whole} holds the problem alone"
-    out.print(text, markup=False, soft_wrap=True)
+    print_line(text)
     if not (found.events or found.complete):
         raise typer.Exit(Code.FAILED)

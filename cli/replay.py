@@ -1,4 +1,4 @@
-"""`brrt replay`: a run's figures and trees, from its recording alone."""
+"""`brrt replay`: the metrics and the trees of a run, from its recording alone."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,88 +6,74 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, note, out, print_json, print_lines, print_rows, print_summary
-from .instants import At, AtEvent, AtIteration, Counted, beyond, instant
-from .node import show_node, tree_number
-from .saved import Saved, opened
+from .console import Code, print_json, print_line, print_lines, print_rows
+from .options import At, AtEvent, AtIteration, Force, Partial, Run, instant
 
 if TYPE_CHECKING:
     from brrt.comparison.difference import Difference
-    from brrt.events import Instant
-    from brrt.recording import Recording
-    from brrt.replay.tree_stats import TreeFigures
+    from brrt.recording import Limits, Recording
 
-_VERB = "replay them"
-_FEW = 3
-"""Events that are told ahead of the one that --check finds; `brrt diff` has more of them."""
+_EVENTS_BEFORE = 3
+"""Events that are printed before a difference; `brrt diff` prints more."""
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
+    run: Run,
     at: At = None,
     at_event: AtEvent = None,
     at_iteration: AtIteration = None,
     node: Annotated[
         int | None,
         typer.Option(
-            help="Tell what became of this node: born, rewired, its descendants, what was "
-            "rejected; with a planner on a lattice, of this cell.",
+            help="Print the history of this node: birth, rewires, descendants, rejected "
+            "extensions; of a lattice planner, of this cell.",
         ),
     ] = None,
     tree: Annotated[
         str | None,
-        typer.Option(help="The node's tree: start (default), goal, or its number.", metavar="TREE"),
+        typer.Option(
+            help="The tree of --node: start (the default), goal, or a number.", metavar="TREE"
+        ),
     ] = None,
     check: Annotated[
         Path | None,
         typer.Option(
-            help="Compare with another recording, event by event without the times; "
-            "exit 1 at the first difference.",
+            help="Compare with another recording, event by event without times; exit code 1 if "
+            "they differ.",
             metavar="GOLDEN",
         ),
     ] = None,
-    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording of it.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
-    partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
-    ] = False,
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording of the run.")] = None,
+    force: Force = False,
+    partial: Partial = False,
     text: Annotated[
         bool,
         typer.Option(
-            "--text", help="Tell the run in plain text without times: the same on every machine."
+            "--text", help="Print a transcript without times, which is equal on every machine."
         ),
     ] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object, as plan --json did.")
+        bool, typer.Option("--json", help="Print one JSON object, the same as plan --json.")
     ] = False,
 ) -> None:
-    """Rebuild the trees and the figures of a run from its recording.
+    """Rebuild the metrics and the trees of a run from its recording.
 
-    With --at-event the event itself is told as well, and the ones ahead of it.
+    With --at-event, the event and those before it are printed as well.
 
-    brrt replay run.mcap
+    A cut or damaged file is replayed up to the fault, which is reported on stderr; --check
+    refuses it unless --partial is given.
 
-    brrt replay run.mcap --at 20ms
-
-    brrt replay run.mcap --at-event 403
-
-    brrt replay run.mcap --text
-
-    brrt replay run.mcap --check recordings/circles2d-rrt.mcap
-
-    brrt replay run.mcap --at-iteration 400 --rrd first400.rrd
-
-    brrt replay run.mcap --node 80 --at-iteration 400
+    Examples:
+      brrt replay run.mcap
+      brrt replay run.mcap --at 20ms
+      brrt replay run.mcap --at-event 403
+      brrt replay run.mcap --text
+      brrt replay run.mcap --check recordings/circles2d-rrt.mcap
+      brrt replay run.mcap --at-iteration 400 --rrd first400.rrd
+      brrt replay run.mcap --node 80 --at-iteration 400
     """
-    from brrt.comparison.difference import event_lines  # noqa: PLC0415
-    from brrt.comparison.events import RecentEvents  # noqa: PLC0415
-    from brrt.replay.fold import feed  # noqa: PLC0415
-    from brrt.replay.metrics import Metrics  # noqa: PLC0415
-    from brrt.replay.transcript import Transcript  # noqa: PLC0415
-    from brrt.replay.tree_stats import TreeStats  # noqa: PLC0415
-    from brrt.scenario.contracts import origins_of  # noqa: PLC0415
-
-    from .outputs import check_output  # noqa: PLC0415
+    from .output_file import check_output
+    from .run_file import open_run
 
     check_output(rrd, "--rrd", ".rrd", force=force)
     _check_together(
@@ -96,101 +82,110 @@ def replay(
         node_and_more=node is not None and bool(text or check or rrd),
     )
     limits = instant(at, at_event, at_iteration)
-    number = tree_number(tree)
-    recording = opened(run, partial=partial)
+    recording = open_run(run, limits, partial=partial or check is None)
     if node is not None:
-        _tell_of(node, number, recording, limits, partial=partial, as_json=as_json)
+        from .node import print_node, tree_number
+
+        print_node(recording, limits, node, tree_number(tree), as_json=as_json)
         return
-    metrics = Metrics(recording.manifest)
-    trees = TreeStats(recording.robot().distance)
-    recent = [] if at_event is None else [RecentEvents()]
-    told = Transcript(recording.manifest, recording.robot()) if text else None
-    folds: list[Any] = [told] if told else [] if as_json else [trees, *recent]
-    end = feed(Saved(recording, partial=partial, verb=_VERB), [metrics, *folds], limits)
-    if end is not None:
-        _note_end(limits, *end)
     if rrd is not None:
-        _draw(recording, rrd, limits, partial=partial)
-    golden = None if check is None else opened(check, partial=False)
-    first = None if golden is None else _difference(recording, golden, partial=partial)
-    figures = metrics.as_dict()
+        _draw(recording, limits, rrd)
+    golden = None if check is None else open_run(check, partial=partial)
+    first = None if golden is None else _first_difference(recording, golden)
     if as_json:
-        verdict = {"equal": first is None, "first": None if first is None else str(first)}
-        print_json(figures if check is None else {**figures, "check": verdict})
-    elif told is None:
-        grown = trees.figures()  # where they are no trees, nothing is told of the run
-        print_summary(figures, origins_of(recording.manifest))
-        _show_trees(grown)
-        for each in recent:
-            print_lines(event_lines(each.before(each.next)))
+        verdict = {"check": {"equal": first is None, "first": first and str(first)}}
+        print_json({**_metrics(recording, limits), **({} if golden is None else verdict)})
+        raise typer.Exit(Code.FAILED if first else Code.DONE)
+    if text:
+        _print_transcript(recording, limits)
     else:
-        print_lines(told.lines())
-    if golden is not None and not as_json:
+        _print_metrics(recording, limits, events=at_event is not None)
+    if golden is not None:
         print_lines(_verdict((str(run), str(check)), (recording, golden), first))
-    raise typer.Exit(Code.FAILED if first is not None else Code.DONE)
+    raise typer.Exit(Code.FAILED if first else Code.DONE)
 
 
 def _check_together(*, text_and_json: bool, lone_tree: bool, node_and_more: bool) -> None:
-    """See that the options go together.
+    """Raise if options exclude each other.
 
     Raises:
-        BrrtError: They do not.
+        BrrtError: They do.
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415
+    from brrt.errors import BrrtError
 
     if text_and_json:
         raise BrrtError("give one of --text and --json")
     if lone_tree:
-        raise BrrtError("--tree is that of a node; add --node NUMBER")
+        raise BrrtError("--tree names the tree of a node; add --node NUMBER")
     if node_and_more:
-        raise BrrtError("--node goes with --at, --tree and --json alone")
+        raise BrrtError("--node excludes --text, --check and --rrd")
 
 
-def _note_end(limits: dict[str, int], count: int, last: "Instant") -> None:
-    late = beyond(limits, count, last)
-    if late is not None:
-        note(f"{late}; this is how it stood then")
-
-
-def _draw(recording: "Recording", rrd: Path, limits: dict[str, int], *, partial: bool) -> None:
-    from brrt.replay.fold import feed  # noqa: PLC0415
-    from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - costs half a second
+def _draw(recording: "Recording", limits: "Limits", rrd: Path) -> None:
+    from brrt.replay.fold import feed
+    from brrt.views.rerun.sink import RerunSink
 
     sink = RerunSink(recording.manifest, recording.world, path=rrd)
     try:
-        feed(Saved(recording, partial=partial, verb=_VERB), [sink], limits)
+        feed(recording.batches(), [sink], limits)
     finally:
         sink.close(None if limits else recording.result)
 
 
-def _tell_of(
-    node: int,
-    tree: int,
-    recording: "Recording",
-    limits: dict[str, int],
-    *,
-    partial: bool,
-    as_json: bool,
-) -> None:
-    from dataclasses import replace  # noqa: PLC0415
+def _first_difference(recording: "Recording", golden: "Recording") -> "Difference | None":
+    from brrt.comparison.events import first_difference
 
-    from brrt.replay.snapshot import Snapshot  # noqa: PLC0415
-
-    batches = Counted(Saved(recording, partial=partial, verb=_VERB))
-    moment = Snapshot(replace(recording, batches=lambda: iter(batches)), limits)
-    show_node(moment, node, tree, as_json=as_json)
-    _note_end(limits, batches.count, batches.last)
+    return first_difference(recording.batches(), golden.batches())
 
 
-def _difference(
-    recording: "Recording", golden: "Recording", *, partial: bool
-) -> "Difference | None":
-    from brrt.comparison.events import first_difference  # noqa: PLC0415
+def _metrics(recording: "Recording", limits: "Limits") -> dict[str, Any]:
+    from brrt.replay.fold import feed
+    from brrt.replay.metrics import Metrics
 
-    return first_difference(
-        Saved(recording, partial=partial, verb=_VERB),
-        Saved(golden, partial=False, verb=_VERB),
-    )
+    metrics = Metrics(recording.manifest)
+    feed(recording.batches(), [metrics], limits)
+    return metrics.as_dict()
+
+
+def _print_transcript(recording: "Recording", limits: "Limits") -> None:
+    from brrt.replay.fold import feed
+    from brrt.replay.transcript import Transcript
+
+    transcript = Transcript(recording.manifest, recording.robot())
+    feed(recording.batches(), [transcript], limits)
+    print_lines(transcript.lines())
+
+
+def _print_metrics(recording: "Recording", limits: "Limits", *, events: bool) -> None:
+    """Print the metrics and a line for each tree, and the last events if asked for."""
+    from brrt.comparison.difference import event_lines
+    from brrt.comparison.events import RecentEvents
+    from brrt.replay.fold import feed
+    from brrt.replay.metrics import Metrics
+    from brrt.replay.tree_stats import TreeStats
+    from brrt.scenario.contracts import origins_of
+
+    from .summary import print_summary
+
+    trees = TreeStats(recording.robot().distance)
+    metrics, recent = Metrics(recording.manifest), RecentEvents()
+    feed(recording.batches(), [metrics, trees, *([recent] if events else [])], limits)
+    rows = [
+        {
+            "tree": str(tree.tree),
+            "nodes": f"{tree.nodes:,}",
+            "leaves": f"{tree.leaves:,}",
+            "depth": f"{tree.depth:,}",
+            "greatest cost-to-come": f"{tree.greatest_cost:.6g}",
+        }
+        for tree in trees.figures()  # raises if the events do not make trees
+    ]
+    print_summary(metrics.as_dict(), origins_of(recording.manifest))
+    if rows:
+        print_line()
+        print_rows(rows)
+    if events:
+        print_lines(event_lines(recent.before(recent.next)))
 
 
 def _verdict(
@@ -198,8 +193,8 @@ def _verdict(
     recordings: "tuple[Recording, Recording]",
     first: "Difference | None",
 ) -> Iterator[str]:
-    """Say whether a run is what another one was, and if not, where they part."""
-    from dataclasses import replace  # noqa: PLC0415
+    """Describe whether two runs are equal, and if not, their first difference."""
+    from dataclasses import replace
 
     a, b = (
         f"{name} (seed {each.manifest.scenario.seed})"
@@ -210,22 +205,6 @@ def _verdict(
         yield f"{a} and {b} are equal, event by event"
         return
     yield from (f"A  {a}", f"B  {b}")
-    few = replace(first, before=first.before[-_FEW:])
-    yield from few.lines(("A", "B"), (recordings[0].result is None, recordings[1].result is None))
-
-
-def _show_trees(trees: "list[TreeFigures]") -> None:
-    """Print a line a tree."""
-    rows = [
-        {
-            "tree": str(tree.tree),
-            "nodes": f"{tree.nodes:,}",
-            "leaves": f"{tree.leaves:,}",
-            "depth": f"{tree.depth:,}",
-            "greatest cost-to-come": f"{tree.greatest_cost:.6g}",
-        }
-        for tree in trees
-    ]
-    if rows:
-        out.print()
-        print_rows(rows)
+    shown = replace(first, before=first.before[-_EVENTS_BEFORE:])
+    cut = (recordings[0].result is None, recordings[1].result is None)
+    yield from shown.lines(("A", "B"), cut)

@@ -1,17 +1,19 @@
 """`brrt verify`: whether a recording keeps what its planner promises."""
 
 import shlex
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import Code, Watch, note, out, print_json, print_lines, tell_of_compiling
-from .saved import Saved, opened
+from .console import Code, announce_compilation, note, print_json, print_line, print_lines
+from .options import Json, Run
+from .progress import ProgressBar
 
 if TYPE_CHECKING:
+    from brrt.events import Events
     from brrt.recording import Recording
     from brrt.runs.reproduce import Reproduction
     from brrt.verification import RuleResult
@@ -21,10 +23,8 @@ _WIDTH = 80
 
 
 def verify(
-    run: Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")],
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the table.")
-    ] = False,
+    run: Run,
+    as_json: Json = False,
     partial: Annotated[
         bool,
         typer.Option(
@@ -64,24 +64,19 @@ def verify(
 
     brrt verify run.mcap --rerun
     """
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.scenario.contracts import contracts_of  # noqa: PLC0415
-    from brrt.verification import examine  # noqa: PLC0415
+    from brrt.errors import BrrtError
+    from brrt.scenario.contracts import contracts_of
+
+    from .run_file import open_run
 
     if tolerance is not None and (not rerun or not tolerance >= 0):
         raise BrrtError("--tolerance must be a number from 0 on, and goes with --rerun alone")
-    recording = opened(run, partial=partial)
+    recording = open_run(run, partial=partial)
     planner = recording.manifest.scenario.planner
-    saved = Saved(recording, partial=partial, verb="verify them")
-    # A file that brrt recover made breaks off too, though it is whole.
-    results = examine(
-        recording.manifest, recording.world, saved,
-        cut=lambda: saved.cut or recording.result is None, figures=recording.result,
-    )  # fmt: skip
-    cut, events = saved.cut or recording.result is None, saved.events
+    results, events, cut = _examine(recording, partial=partial)
     broken = sum(result.broken for result in results)
     known = contracts_of(recording.manifest, recording.world)[-1] is not None
-    again = _reproduced(recording, saved, tolerance) if rerun else None
+    again = _reproduced(recording, tolerance) if rerun else None
     _note_differences(recording)
     if as_json:
         print_json(
@@ -95,7 +90,7 @@ def verify(
             }
         )
     else:
-        if cut and not saved.cut:
+        if cut:
             note(f"{run} breaks off; what is promised of a run's end was left out")
         if not known:
             note(
@@ -111,8 +106,8 @@ def verify(
 
 def _note_differences(recording: "Recording") -> None:
     """Note where another version's planner stated another contract; no rule judges that."""
-    from brrt.scenario.contracts import contract_differences  # noqa: PLC0415
-    from brrt.verification.rules.contracts import same_version  # noqa: PLC0415
+    from brrt.scenario.contracts import contract_differences
+    from brrt.verification.rules.contracts import same_version
 
     manifest = recording.manifest
     if not same_version(manifest):
@@ -121,18 +116,41 @@ def _note_differences(recording: "Recording") -> None:
             note(f"the contract is that of brrt {made_by}: {difference}")
 
 
-def _reproduced(recording: "Recording", saved: Saved, tolerance: float | None) -> "Reproduction":
+def _examine(recording: "Recording", *, partial: bool) -> "tuple[list[RuleResult], int, bool]":
+    """Return what each rule found, the number of events, and whether the run's end is missing."""
+    from brrt.verification import examine
+
+    count = 0
+
+    def batches() -> "Iterator[Events]":
+        nonlocal count
+        for batch in recording.batches():
+            count += len(batch)
+            yield batch
+
+    def is_cut() -> bool:
+        if recording.result is None:  # as in a file that brrt recover made, though it is whole
+            return True
+        return partial and count < recording.result["events"]
+
+    results = examine(
+        recording.manifest, recording.world, batches(), cut=is_cut, figures=recording.result
+    )
+    return results, count, is_cut()
+
+
+def _reproduced(recording: "Recording", tolerance: float | None) -> "Reproduction":
     """Plan the run again, with a progress bar."""
-    from brrt.runs.reproduce import TOLERANCE, reproduce  # noqa: PLC0415
+    from brrt.runs.reproduce import TOLERANCE, reproduce
 
     def watch(done: int, total: int) -> None:
         bar.total = total
         bar.update(done, "planning again", f"{done:,} of {total:,} events")
 
-    tell_of_compiling()
-    with Watch(None, "preparing the planner").running() as bar:
+    announce_compilation()
+    with ProgressBar(None, "preparing the planner").running() as bar:
         return reproduce(
-            replace(recording, batches=lambda: iter(saved)),
+            recording,
             tolerance=TOLERANCE if tolerance is None else tolerance,
             watch=watch,
         )
@@ -143,7 +161,7 @@ def _show_again(again: "Reproduction") -> None:
     *details, verdict = again.lines()
     print_lines(details)
     style = "bold green" if again.equal else ""
-    out.print(verdict, style=style, markup=False, soft_wrap=True)
+    print_line(verdict, style=style)
 
 
 def _look(run: Path, seq: int) -> str:
@@ -183,27 +201,27 @@ def _show(run: Path, results: "list[RuleResult]", *, long: bool) -> None:
         verdict = f"BROKEN {times}" if result.broken else "holds"
         line = f"{result.rule:{name}}  {result.examined:>{count},}  {verdict:6}"
         promise = "" if long or result.broken else _short(result.promise, _WIDTH - len(line) - 2)
-        out.print(f"{line}  {promise}".rstrip(), style=_style(result), markup=False, soft_wrap=True)
+        print_line(f"{line}  {promise}".rstrip(), style=_style(result))
         if long or result.broken:
             _tell(result.promise, style="dim")
         for found in result.findings[:_SHOWN]:
             where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
             _tell(f"{where}: {found.message}")
         if result.broken > _SHOWN:
-            out.print(f"  ... and {result.broken - _SHOWN:,} more")
+            print_line(f"  ... and {result.broken - _SHOWN:,} more")
         if result.findings:
             first = _look(run, result.findings[0].seq)
-            out.print(f"  look: {first}", markup=False, soft_wrap=True)
+            print_line(f"  look: {first}")
     broken = sum(bool(result.broken) for result in looked)
     total = f"{len(looked)} rules, {broken} broken" if broken else f"all {len(looked)} rules hold"
-    out.print(total, style="bold red" if broken else "bold green")
+    print_line(total, style="bold red" if broken else "bold green")
 
 
 def _tell(text: str, style: str = "") -> None:
     """Print a sentence below its rule, no wider than a terminal."""
     whole = TextWrapper(_WIDTH, "  ", "    ", break_long_words=False, break_on_hyphens=False)
     for line in whole.wrap(text):
-        out.print(line, style=style, markup=False, soft_wrap=True)
+        print_line(line, style=style)
 
 
 def _style(result: "RuleResult") -> str:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import SIGNALLED, Watch, out
-from .instants import At, AtEvent, AtIteration, beyond, instant
-from .saved import Saved, opened
+from .console import SIGNALLED, print_line
+from .options import Accepted, At, AtEvent, AtIteration, instant
+from .progress import ProgressBar
 from .signals import handling_signals
 
 if TYPE_CHECKING:
@@ -62,42 +62,37 @@ def view(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the picture.")] = False,
-    partial: Annotated[
-        bool, typer.Option("--partial", help="Take what is whole of a cut or damaged file.")
-    ] = False,
+    _partial: Accepted = False,
 ) -> None:
     """Show a recording, or two side by side with a ring where they first differ.
 
     The window stays open when the command ends.
 
-    brrt view run.mcap
-
-    brrt view run.mcap --at-iteration 400
-
-    brrt view seven.mcap eight.mcap
-
-    brrt view run.mcap --web
-
-    brrt view run.mcap --at 20ms --screenshot run.png
+    Examples:
+      brrt view run.mcap
+      brrt view run.mcap --at-iteration 400
+      brrt view seven.mcap eight.mcap
+      brrt view run.mcap --web
+      brrt view run.mcap --at 20ms --screenshot run.png
     """
     limits = instant(at, at_event, at_iteration)
     pixels = _check(runs, limits, web, port, screenshot, size, force=force)
     # The handler raises, so a signal too removes the folder and ends the processes started here.
     with tempfile.TemporaryDirectory(prefix="brrt-") as folder, handling_signals(_end):
-        with Watch(None, "drawing").running() as watch:
-            file, cursor = _draw(runs, limits, Path(folder), watch, partial=partial)
+        with ProgressBar(None, "drawing").running() as watch:
+            file, cursor = _draw(runs, limits, Path(folder), watch)
         if web:
             _serve(file, runs, port)
             return
-        from brrt.views.viewer import control  # noqa: PLC0415 - costs half a second
+        from brrt.views.viewer import control
 
-        with Watch(None, "waiting for the viewer").running():
+        with ProgressBar(None, "waiting for the viewer").running():
             if screenshot is None:
                 control.show(file, cursor)
             else:
                 control.screenshot(file, screenshot, cursor, pixels)
         if screenshot is not None:
-            out.print(f"{screenshot}: written", markup=False, soft_wrap=True)
+            print_line(f"{screenshot}: written")
 
 
 def _check(
@@ -111,9 +106,9 @@ def _check(
     force: bool,
 ) -> tuple[int, int]:
     """Check the options; return the size of the picture in pixels."""
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
+    from brrt.errors import BrrtError
 
-    from .outputs import check_output, check_window  # noqa: PLC0415
+    from .output_file import check_output, check_window
 
     if len(runs) > 2:
         raise BrrtError(f"brrt view shows one run, or two side by side, not {len(runs)}")
@@ -143,17 +138,17 @@ def _check(
 
 
 def _draw(
-    runs: list[Path], limits: dict[str, int], folder: Path, watch: Watch, *, partial: bool
+    runs: list[Path], limits: dict[str, int], folder: Path, watch: ProgressBar
 ) -> "tuple[Path, Cursor | None]":
     """Return an .rrd file of the runs, drawn into the folder if needed, and where to open it."""
     recordings = []
     for run in runs:
         watch.update(0, f"reading {run.name}", "")
-        recordings.append(_load(run, partial=partial))
+        recordings.append(_load(run))
     _check_instant(limits, recordings)
-    from brrt.views.rerun.drawing import draw_run  # noqa: PLC0415 - costs half a second
-    from brrt.views.rerun.pair import draw_pair  # noqa: PLC0415
-    from brrt.views.viewer.control import Cursor  # noqa: PLC0415
+    from brrt.views.rerun.drawing import draw_run
+    from brrt.views.rerun.pair import draw_pair
+    from brrt.views.viewer.control import Cursor
 
     cursors = [Cursor(_TIMELINES[name], value) for name, value in limits.items()]
     cursor, file = cursors[0] if cursors else None, folder / f"{runs[0].stem}.rrd"
@@ -161,7 +156,7 @@ def _draw(
         watch.update(0, "drawing both runs", "")
         difference = draw_pair(file, *recordings)
         result = "are equal, event by event" if difference is None else f"part at {difference}"
-        out.print(f"{runs[0]} and {runs[1]} {result}", markup=False, soft_wrap=True)
+        print_line(f"{runs[0]} and {runs[1]} {result}")
         if cursor is None and difference is not None:
             cursor = Cursor("event", difference.seq)
         return file, cursor
@@ -178,37 +173,40 @@ def _draw(
     return file, cursor
 
 
-def _load(run: Path, *, partial: bool) -> "Recording":
+def _load(run: Path) -> "Recording":
     """Return a recording with its events in memory."""
-    recording = opened(run, partial=partial)
-    saved = Saved(recording, partial=partial, verb="show them")
-    batches = [batch for batch in saved if len(batch)]
+    from .run_file import open_run
+
+    recording = open_run(run, partial=True)
+    batches = [batch for batch in recording.batches() if len(batch)]
     return replace(recording, batches=lambda: batches)
 
 
 def _check_instant(limits: dict[str, int], recordings: "list[Recording]") -> None:
     """Check that at least one of the runs lasts until the instant."""
-    from brrt.errors import BrrtError  # noqa: PLC0415 - keep --help fast
-    from brrt.events import Instant  # noqa: PLC0415
+    from brrt.errors import BrrtError
+    from brrt.events import Instant
+
+    from .run_file import end_before
 
     ends = []
     for recording in recordings:
         log = list(recording.batches())
         last = log[-1].last if log else Instant(0, 0)
-        ends.append(beyond(limits, sum(map(len, log)), last))
+        ends.append(end_before(limits, sum(map(len, log)), last))
     if all(ends):
         raise BrrtError(f"{ends[-1]}; the instant asked for comes later")
 
 
 def _serve(file: Path, runs: list[Path], port: int | None) -> None:
-    from brrt.views.viewer.web import Server  # noqa: PLC0415 - costs half a second
+    from brrt.views.viewer.web import Server
 
     server = Server(file, port)
     try:
         what = " and ".join(map(str, runs))
-        out.print(f"{what} at {server.address}", markup=False, soft_wrap=True)
-        out.print("Ctrl-C ends it")
-        out.file.flush()
+        print_line(f"{what} at {server.address}")
+        print_line("Ctrl-C ends it")
+        sys.stdout.flush()
         server.wait()
     finally:
         server.close()

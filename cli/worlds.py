@@ -5,17 +5,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.markup import escape
 
 from brrt.replay.text import counted
 
-from .console import Watch, note, out, print_json, print_pairs, print_rows
-from .lists import Json, chosen, described, print_described
+from .command import Command, Group
+from .console import (
+    console,
+    note,
+    print_json,
+    print_line,
+    print_pairs,
+    print_rows,
+)
+from .lists import chosen, described, print_described
+from .options import Force, Json
+from .progress import ProgressBar
 
 if TYPE_CHECKING:
     from brrt.worlds import World
 
-app = typer.Typer(invoke_without_command=True)
+app = typer.Typer(name="worlds", cls=Group, invoke_without_command=True, add_completion=False)
 Named = Annotated[
     str,
     typer.Argument(
@@ -30,7 +39,6 @@ Start = Annotated[
 Goal = Annotated[
     str | None, typer.Option(help="Goal, instead of the world's own.", metavar="X,Y[,Z]")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Overwrite files.")]
 PICTURES = (".png", ".svg", ".pdf")
 
 
@@ -48,7 +56,7 @@ def worlds(context: typer.Context, *, as_json: Json = False) -> None:
         list_worlds(None, as_json=as_json)
 
 
-@app.command("list")
+@app.command("list", cls=Command)
 def list_worlds(
     name: Annotated[
         str | None, typer.Argument(help="Only this generator or format.", show_default=False)
@@ -57,7 +65,7 @@ def list_worlds(
     as_json: Json = False,
 ) -> None:
     """List the world generators with their parameters, and the files that can be loaded."""
-    from brrt.worlds import GENERATORS, LOADERS  # noqa: PLC0415 - keep --help fast
+    from brrt.worlds import GENERATORS, LOADERS
 
     generators, files = described(dict(GENERATORS)), described(dict(LOADERS))
     for key, loader in LOADERS.items():
@@ -74,23 +82,23 @@ def list_worlds(
             "Show one: brrt worlds show circles2d:n=80,seed=3, or map.yaml:unknown=free",
             "Plan in one: brrt plan --world arena.map.scen#12",
         ):
-            out.print(line, markup=False)
+            print_line(line)
 
 
 def _print_overview(generators: dict[str, Any], files: dict[str, Any]) -> None:
     print_rows(
         [{"name": key, "about": entry["about"]} for key, entry in generators.items()], whole=1
     )
-    out.print()
+    print_line()
     rows = [
         {"file": key, "about": f["about"], "endings": " ".join(f["endings"])}
         for key, f in files.items()
     ]
     print_rows(rows, whole=1)
-    out.print()
+    print_line()
 
 
-@app.command()
+@app.command(cls=Command)
 def show(
     world: Named,
     *,
@@ -110,14 +118,14 @@ def show(
 
     brrt worlds show map.txt --start 0,0,1 --goal 12,12,5 --out map.png
     """
-    from brrt.worlds.free_space import connected, free_fraction  # noqa: PLC0415 - keep --help fast
+    from brrt.worlds.free_space import connected, free_fraction
 
-    from .outputs import check_display, check_output  # noqa: PLC0415
+    from .output_file import check_display, check_output
 
     check_output(picture, "--out", PICTURES, force=force)
     check_output(rrd, "--rrd", ".rrd", force=force)
     check_display(view=view)
-    with Watch(None, "making the world").running() as watch:
+    with ProgressBar(None, "making the world").running() as watch:
         made = _made(world, start, goal)
         figures = _figures(made)
         watch.update(0, "measuring the free share", "")
@@ -132,16 +140,18 @@ def show(
     if as_json:
         print_json(figures)
         return
-    out.print(drawing, soft_wrap=True)
+    console().print(drawing, soft_wrap=True)
     print_pairs(_rows(figures))
     if picture is not None:
-        out.print(f"\n{picture}: a picture of it", markup=False, soft_wrap=True)
+        print_line(f"\n{picture}: the picture")
     if rrd is not None:
+        from rich.markup import escape
+
         name = escape(str(rrd))
-        out.print(f"\n{name}: open it with [bold]rerun {name}[/bold]", soft_wrap=True)
+        console().print(f"\n{name}: open it with [bold]rerun {name}[/bold]", soft_wrap=True)
 
 
-@app.command()
+@app.command(cls=Command)
 def make(
     world: Named,
     *,
@@ -156,21 +166,21 @@ def make(
 
     brrt worlds make circles2d:n=80,seed=3 --out w.json
     """
-    from .outputs import check_output  # noqa: PLC0415 - keep --help fast
+    from .output_file import check_output
 
     check_output(file, "--out", ".json", force=force)
-    with Watch(None, "making the world").running():
+    with ProgressBar(None, "making the world").running():
         made = _made(world, start, goal)
         made.save(file)
     what = ", ".join(_counts(_figures(made))) or "no obstacles"
     text = f"{file}: {made.dim}D, {what}; plan in it with --world {file}"
-    out.print(text, markup=False, soft_wrap=True)
+    print_line(text)
 
 
 def _made(spec: str, start: str | None, goal: str | None) -> "World":
-    from dataclasses import replace  # noqa: PLC0415 - keep --help fast
+    from dataclasses import replace
 
-    from brrt.worlds import make_world  # noqa: PLC0415
+    from brrt.worlds import make_world
 
     ends = {"start": _point("--start", start), "goal": _point("--goal", goal)}
     world = make_world(spec, **ends)
@@ -180,9 +190,9 @@ def _made(spec: str, start: str | None, goal: str | None) -> "World":
 
 
 def _point(option: str, text: str | None) -> Any:
-    import numpy as np  # noqa: PLC0415 - keep --help fast
+    import numpy as np
 
-    from brrt.errors import BrrtError  # noqa: PLC0415
+    from brrt.errors import BrrtError
 
     try:
         return None if text is None else np.array([float(part) for part in text.split(",")])
@@ -190,9 +200,10 @@ def _point(option: str, text: str | None) -> Any:
         raise BrrtError(f"{option} must be numbers like 1,2, not {text!r}") from None
 
 
-def _drawing(world: "World") -> Any:
-    from .draw_world import draw_world  # noqa: PLC0415 - keep --help fast
+def _sketch(world: "World") -> Any:
+    from .draw_world import draw_world
 
+    out = console()
     try:
         "█░┌".encode(out.encoding)
         blocks = True
@@ -205,11 +216,11 @@ def _drawing(world: "World") -> Any:
 
 def _write(world: "World", picture: Path | None, rrd: Path | None, *, view: bool) -> None:
     if picture is not None:
-        from brrt.views.matplotlib.draw_world import save_world  # noqa: PLC0415 - matplotlib is an extra
+        from brrt.views.matplotlib.draw_world import save_world
 
         save_world(world, picture)
     if rrd is not None or view:
-        from brrt.views.rerun.draw_world import show_world  # noqa: PLC0415 - costs half a second
+        from brrt.views.rerun.draw_world import show_world
 
         show_world(world, path=rrd, view=view)
 

@@ -70,7 +70,7 @@ def brrt_golden(request: pytest.FixtureRequest) -> "Golden":
 
     The failure's message is what `brrt diff` prints. pytest --brrt-update makes and renews files.
     """
-    from .fixtures import Golden  # noqa: PLC0415 - brrt takes a second to import
+    from .fixtures import Golden
 
     return Golden(request)
 
@@ -83,6 +83,6 @@ def brrt_gate(request: pytest.FixtureRequest) -> "Gate":
 
     fails if the data prove that costs grew by more than 2 %, or iterations by more than 10 %.
     """
-    from .fixtures import Gate  # noqa: PLC0415 - brrt takes a second to import
+    from .fixtures import Gate
 
     return Gate(request)

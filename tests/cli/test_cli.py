@@ -214,19 +214,23 @@ def test_existing_output_is_kept(brrt: Command) -> None:
 
 
 def test_cut_and_foreign_recordings(brrt: Command) -> None:
-    """A cut file is refused with what can be saved; --partial replays that."""
+    """A cut file is replayed with one line on stderr; with --check it needs --partial."""
     brrt("plan", "--out", "a.mcap", "--iterations", 30_000, "--param", "goal_bias=0",
          "--param", "step=0.02")  # fmt: skip
     whole = Path("a.mcap").read_bytes()
     Path("cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
-    done = brrt("replay", "cut.mcap")
-    assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "is cut at byte" in done.err
-    assert "replay them with --partial" in done.err
-    partial = brrt("replay", "cut.mcap", "--partial", "--json")
-    assert partial.code == 0
-    assert partial.json["status"] == "running"
-    assert 0 < partial.json["events"] < 60_003
+    for options in ([], ["--partial"]):
+        done = brrt("replay", "cut.mcap", "--json", *options)
+        assert (done.code, done.err.count("\n")) == (0, 1)
+        assert "is cut at byte" in done.err
+        assert "the run did not finish" in done.err
+        assert done.json["status"] == "running"
+        assert 0 < done.json["events"] < 60_003
+    for options in (["cut.mcap", "--check", "a.mcap"], ["a.mcap", "--check", "cut.mcap"]):
+        done = brrt("replay", *options)
+        assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+        assert "with --partial, or save them with brrt recover cut.mcap" in done.err
+        assert brrt("replay", *options, "--partial").code == 1
     for name, text in (("a.txt", "hello"), ("b.mcap", "hello"), ("c.rrd", "RRF2hello")):
         Path(name).write_text(text)
         assert brrt("replay", name).code == 2

@@ -90,13 +90,12 @@ def test_several_runs_share_their_costs_only(brrt: Command) -> None:
 
 
 def test_a_cut_recording_is_drawn_as_far_as_it_is_whole(brrt: Command) -> None:
-    """Only with --partial."""
+    """One line on stderr reports the cut."""
     data = (RECORDINGS / "circles2d-chain.mcap").read_bytes()
     Path("cut.mcap").write_bytes(data[: len(data) * 2 // 3])
-    done = brrt("plot", "cut.mcap", "--out", "x.png")
-    assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "--partial" in done.err
-    assert brrt("plot", "cut.mcap", "--out", "x.png", "--partial", "--dpi", 50).code == 0
+    done = brrt("plot", "cut.mcap", "--out", "x.png", "--dpi", 50)
+    assert (done.code, done.err.count("\n")) == (0, 1)
+    assert "the run did not finish" in done.err
     assert Path("x.png").exists()
 
 

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +141,7 @@ def test_the_sketch_is_the_world(
     """Dark where obstacles are, S and G where they stand, no wider than the terminal."""
     world = World("w", np.zeros(2), np.array([20.0, 10]), boxes=np.array([[10.0, 5, 20, 10]]))
     world.save("w.json")
-    monkeypatch.setattr("brrt_cli.console.out._width", columns)
+    monkeypatch.setattr(import_module("brrt_cli.console").console(), "_width", columns)
     text = brrt("worlds", "show", "w.json", "--start", "1,9", "--goal", "19,1").out
     lines = drawing(text)
     assert all(len(line) <= columns for line in text.splitlines())

@@ -166,26 +166,29 @@ def test_what_a_cut_leaves_holds(log: Events, brrt: Command, tmp_path: Path) -> 
 
 
 def test_commands_name_remedies(log: Events, brrt: Command, tmp_path: Path) -> None:
-    """Of a damaged .mcap each command names both; of a cut .rrd, the .mcap."""
+    """Commands that judge a damaged .mcap name both; of a cut .rrd, all name the .mcap."""
     path = tmp_path / "run.mcap"
     data = path.read_bytes()
     chunk = mcap_records(data, 6)[-1][0] + 60
     for place, least, most in ((chunk, 1, len(log) - 1), (-40, len(log), len(log))):
         path.write_bytes(flipped(data, place % len(data)))
-        for command in ("replay", "verify", "explain"):
-            done = brrt(command, path.name)
+        for command, *other in (["verify"], ["diff", path.name]):
+            done = brrt(command, path.name, *other)
             assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
             assert " with --partial, or save them with brrt recover run" in done.err
             assert ("no event is lost" in done.err) == (most == len(log))
         assert brrt("verify", path.name, "--partial").code == 0
-        done = brrt("replay", path.name, "--partial", "--json")
+        done = brrt("explain", path.name)
         assert (done.code, done.err.count("\n")) == (0, 1)
+        done = brrt("replay", path.name, "--json")
+        assert (done.code, done.err.count("\n")) == (0, 1)
+        assert ("no event is lost" in done.err) == (most == len(log))
         assert least <= done.json["events"] <= most
     write(tmp_path / "run.rrd", recorded(SCENARIO)[0], log)
     rrd = (tmp_path / "run.rrd").read_bytes()
     Path("cut.rrd").write_bytes(rrd[: len(rrd) // 2])
     for command, *options in (
-        ("replay", "--partial"), ("verify",), ("explain",), ("view", "--screenshot", "x.png"),
+        ("replay",), ("verify", "--partial"), ("explain",), ("view", "--screenshot", "x.png"),
         ("plot", "--out", "x.png"), ("export", "--foxglove", "x.mcap"),
         ("recover", "--out", "x.mcap"), ("diff", "run.rrd"),
     ):  # fmt: skip

@@ -1,4 +1,4 @@
-"""Which files a command writes: checked before anything is written."""
+"""The files that a command writes and the windows it opens, checked before any work."""
 
 import os
 import sys
@@ -10,10 +10,10 @@ from brrt.errors import BrrtError
 def check_output(
     path: Path | None, option: str, suffix: str | tuple[str, ...], *, force: bool
 ) -> None:
-    """See that a file can be written.
+    """Raise unless a file can be written.
 
     Raises:
-        BrrtError: The name, the folder or what stands there already forbids it.
+        BrrtError: Its name, its folder or an existing file forbids it.
     """
     if path is None:
         return
@@ -31,25 +31,25 @@ def check_output(
 
 
 def check_display(*, view: bool) -> None:
-    """See that a viewer can open a window.
+    """Raise if a viewer is to open and there is no display; Rerun would wait for it forever.
 
     Raises:
-        BrrtError: There is no display; Rerun would wait for its viewer for ever.
+        BrrtError: There is no display.
     """
     if view and not _has_display():
         raise BrrtError("--view needs a display and there is none; use --rrd instead")
 
 
 def check_window() -> None:
-    """See that `brrt view` can open a window.
+    """Raise unless `brrt view` can open a window.
 
     Raises:
         BrrtError: There is no display.
     """
     if not _has_display():
         raise BrrtError(
-            "the viewer's window needs a display and there is none; look with the browser (--web) "
-            "or take a picture (--screenshot x.png)"
+            "the viewer's window needs a display and there is none; use the browser (--web) or "
+            "take a picture (--screenshot x.png)"
         )
 
 
