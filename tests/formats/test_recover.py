@@ -169,7 +169,8 @@ def test_commands_name_remedies(log: Events, brrt: Command, tmp_path: Path) -> N
     """Of a damaged .mcap each command names both; of a cut .rrd, the .mcap."""
     path = tmp_path / "run.mcap"
     data = path.read_bytes()
-    for place, least, most in ((len(data) // 2, 1, len(log) - 1), (-40, len(log), len(log))):
+    chunk = mcap_records(data, 6)[-1][0] + 60
+    for place, least, most in ((chunk, 1, len(log) - 1), (-40, len(log), len(log))):
         path.write_bytes(flipped(data, place % len(data)))
         for command in ("replay", "verify", "explain"):
             done = brrt(command, path.name)

@@ -337,7 +337,7 @@ def test_columns_of_other_types(case: str, tmp_path: Path) -> None:
             for name, values in given.items()
             if values is not None
         ]
-        rec.send_columns(
+        sink._rec.send_columns(
             "/ev/phase", time_columns(np.zeros(1, table_dtype(Kind.PHASE, 2))), columns
         )
         sink._write_texts(END, {"events": "1"})

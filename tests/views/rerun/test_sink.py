@@ -1,8 +1,5 @@
-"""The sink into Rerun: what it draws as events come, full disks, and viewers that are not there."""
+"""The sink into Rerun: what it draws as events come, full disks, closed viewers."""
 
-import socket
-import threading
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +15,7 @@ from brrt.events import Stage, table_dtype
 from brrt.files import OutputFile
 from brrt.recording import Memory
 from brrt.views import colours
-from brrt.views.rerun import layout, sink
+from brrt.views.rerun import sink
 from brrt.views.rerun.draw import canvas, decimate, trees
 from brrt.views.rerun.pipe import FilePipe
 from brrt.views.rerun.sink import RerunSink
@@ -49,7 +46,7 @@ def write(path: Path, scenario: Scenario) -> tuple[Run, Events]:
 
 
 def chunks(path: Path, entity: str) -> list[Any]:
-    """The record batches of an entity, the still ones left out."""
+    """Return the record batches of an entity that are not static."""
     stream = RrdReader(path).stream()
     return [
         chunk.to_record_batch()
@@ -59,7 +56,7 @@ def chunks(path: Path, entity: str) -> list[Any]:
 
 
 def column(path: Path, entity: str, ending: str) -> list[Any]:
-    """The values of a component, one list a row."""
+    """Return the values of a component, one list a row."""
     rows = []
     for batch in chunks(path, entity):
         (name,) = (name for name in batch.schema.names if name.endswith(ending))
@@ -68,7 +65,7 @@ def column(path: Path, entity: str, ending: str) -> list[Any]:
 
 
 def log_lines(path: Path) -> list[str]:
-    """The text log."""
+    """Return the text log."""
     return [text for (text,) in column(path, "/log", ":text")]
 
 
@@ -131,7 +128,7 @@ def test_path_shrinks_to_the_smoothed_one(tmp_path: Path) -> None:
     assert np.array_equal(drawn, raw["waypoints"].astype(np.float32))
 
 
-def test_log_tells_what_matters(tmp_path: Path) -> None:
+def test_text_log(tmp_path: Path) -> None:
     """The text log has phases and paths, in order."""
     path = tmp_path / "run.rrd"
     write(path, SCENARIOS["2d"])
@@ -199,15 +196,8 @@ def test_rows_grow_with_what_there_is(first: int, counts: list[int]) -> None:
         first += count
 
 
-def test_name_of_a_recording() -> None:
-    """Runs that are equal have one, others another."""
-    a, b = (Run(SCENARIOS["2d"]).manifest for _ in range(2))
-    other = Run(Scenario(world="circles2d:n=30", seed=8, clock="logical")).manifest
-    assert layout.recording_id(a) == layout.recording_id(b) != layout.recording_id(other)
-
-
 def test_unwritable_path(tmp_path: Path) -> None:
-    """A file that cannot be made is told before the run."""
+    """A file that cannot be made is an error before the run."""
     run = Run(SCENARIOS["unsolved"])
     with pytest.raises(RecordingError, match=r"cannot write .*none/run\.rrd: No such file"):
         RerunSink(run.manifest, run.problem.world, path=tmp_path / "none" / "run.rrd")
@@ -255,7 +245,7 @@ def test_whatever_fails_in_a_pipe_is_raised(
 
 
 def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The run and its file do not mind that someone closes the viewer."""
+    """A viewer that is closed disturbs neither the run nor its file."""
     port = process.free_port()
     monkeypatch.setattr(process, "PORT", port)
     other = rr.RecordingStream("viewer", send_properties=False)
@@ -269,56 +259,3 @@ def test_viewer_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
             other.disconnect()
     sink.close(result_of(run.manifest, memory.events()))
     assert same(read(tmp_path / "run.rrd").events(), memory.events())
-
-
-def test_no_viewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A viewer that is not there, or does not start, is told in one line."""
-    monkeypatch.setattr(process, "PORT", process.free_port())
-    dying = tmp_path / "dying"
-    dying.write_text("#!/bin/sh\necho one; echo 'no screen' >&2; exit 3\n")
-    dying.chmod(0o755)
-    run = Run(SCENARIOS["unsolved"])
-    for program, message in (
-        (None, "there is no Rerun viewer; pip install rerun-sdk brings it"),
-        (dying, "the Rerun viewer ended: no screen"),
-    ):
-        monkeypatch.setattr(process, "program", lambda found=program: found)
-        with pytest.raises(RecordingError) as told:
-            RerunSink(run.manifest, run.problem.world, view=True)
-        assert str(told.value) == message
-
-
-@pytest.mark.parametrize("answer", [b"", b"HTTP/1.0 505 No\r\n\r\n"])
-def test_no_viewer_but_something_else(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever listens where a viewer should, we do not wait for it for ever."""
-    monkeypatch.setattr(process, "_HELLO_S", 0.2)
-    with socket.create_server((process.HERE, 0)) as server:
-        monkeypatch.setattr(process, "PORT", server.getsockname()[1])
-        if answer:
-            threading.Thread(target=_answer, args=(server, answer), daemon=True).start()
-        with pytest.raises(RecordingError, match=f"program at port {process.PORT} is not"):
-            process.open_viewer()
-
-
-def _answer(server: socket.socket, answer: bytes) -> None:
-    held = []
-    while True:
-        try:
-            connection, _ = server.accept()
-        except OSError:
-            return
-        connection.sendall(answer)
-        held.append(connection)
-
-
-def test_layouts_are_shared_by_what_can_share_them() -> None:
-    """A viewer keeps one layout, and one kind of configuration, for each application."""
-    pairs = set()
-    for path in (Path(__file__).parents[2] / "recordings").glob("*.mcap"):
-        manifest, world = read(path).manifest, read(path).world
-        bounds = (*world.lower, *world.upper)
-        what = (manifest.dim, manifest.dof, manifest.scenario.execute, bounds)
-        for each in (world, replace(world, y_down=True)) if world.dim == 2 else (world,):
-            pairs.add((layout.application(manifest, each), (*what, each.y_down)))
-    names, wholes = zip(*pairs, strict=True)
-    assert len(set(names)) == len(set(wholes)) == len(pairs) > 6
