@@ -200,7 +200,7 @@ def _point(option: str, text: str | None) -> Any:
         raise BrrtError(f"{option} must be numbers like 1,2, not {text!r}") from None
 
 
-def _sketch(world: "World") -> Any:
+def _drawing(world: "World") -> Any:
     from .draw_world import draw_world
 
     out = console()
