@@ -62,11 +62,6 @@ def interval_messages(
             yield message
 
 
-def topics(instants: int, batch: int = BATCH) -> int:
-    """Return the number of topics that may be used for so many instants."""
-    return 2 + _sizes(instants, batch)
-
-
 def _sizes(instants: int, batch: int) -> int:
     """Return how often batches are paired until one span has all instants."""
     return max(0, -(-instants // batch) - 1).bit_length()

@@ -8,17 +8,17 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.views.colours import Colour
+from brrt.views.colours import Colour, rgb
 from brrt.worlds.occupancy import Grid
 
 FRAME = "world"
 """The only frame; there are no transforms."""
+_STAMP_AND_FRAME = struct.pack("<iII", 0, 0, len(FRAME) + 1) + FRAME.encode() + b"\0"
 
 _HEADER = """
 MSG: std_msgs/Header
@@ -135,17 +135,18 @@ class Marker:
 
     def message(self) -> bytes:
         """Return the marker as a message; a list without points deletes it."""
-        body = _Body(_head(self._style()))
-        self._put_rest(body)
+        body = _Body()
+        self.put(body, 0)
         return bytes(body.data)
 
-    def _style(self) -> "_Style":
+    def put(self, body: "_Body", number: int) -> None:
+        """Append the marker to a message."""
         gone = self.points is not None and not len(self.points)
-        place = _space(self.place, self.z)
-        return _Style(self.type, gone, place, self.scale, self.colour, self.alpha)
-
-    def _put_rest(self, body: "_Body") -> None:
-        """Append what differs between the many states of one marker."""
+        body.header()
+        body.text("")
+        body.put("3i", number, self.type, 2 if gone else 0)
+        body.put("10d", *_space(self.place, self.z), 0, 0, 0, 1, *self.scale)
+        body.put("4fiI?", *rgb(self.colour), self.alpha, 0, 0, False)
         points = np.empty((0, 3)) if self.points is None else self.points
         body.rows(_heights(points, self.z), "<f8")
         body.rows(np.empty((0, 4)) if self.colours is None else self.colours, "<f4")
@@ -159,8 +160,7 @@ def marker_array(markers: Sequence[Marker]) -> bytes:
     body = _Body()
     body.put("I", len(markers))
     for number, marker in enumerate(markers):
-        _put_style(body, marker._style(), number)  # noqa: SLF001 - the other form of the same type
-        marker._put_rest(body)  # noqa: SLF001
+        marker.put(body, number)
     return bytes(body.data)
 
 
@@ -178,22 +178,11 @@ def occupancy(grid: Grid, z: float) -> bytes:
     return bytes(body.data)
 
 
-class _Style(NamedTuple):
-    """What stays the same in all states of a marker."""
-
-    type: MarkerType
-    gone: bool
-    place: tuple[float, float, float]
-    scale: tuple[float, float, float]
-    colour: Colour
-    alpha: float
-
-
 class _Body:
     """A message that is being written: numbers are aligned to their size, counted after byte 4."""
 
-    def __init__(self, data: bytes = b"\x00\x01\x00\x00") -> None:
-        self.data = bytearray(data)
+    def __init__(self) -> None:
+        self.data = bytearray(b"\x00\x01\x00\x00")
 
     def put(self, codes: str, *values: Any) -> None:
         """Append numbers in the format `codes` of `struct`; none may be larger than the first."""
@@ -202,8 +191,8 @@ class _Body:
 
     def header(self) -> None:
         """Append a header; a stamp of 0 asks for no transforms of a certain time."""
-        self.put("iI", 0, 0)
-        self.text(FRAME)
+        self._align(4)
+        self.data += _STAMP_AND_FRAME
 
     def text(self, text: str) -> None:
         """Append a text."""
@@ -220,24 +209,6 @@ class _Body:
 
     def _align(self, size: int) -> None:
         self.data += bytes(-(len(self.data) - 4) % size)
-
-
-@lru_cache(64)
-def _head(style: _Style) -> bytes:
-    """Return the beginning of a marker's message, up to its points."""
-    body = _Body()
-    _put_style(body, style, 0)
-    return bytes(body.data)
-
-
-def _put_style(body: _Body, style: _Style, number: int) -> None:
-    body.header()
-    body.text("")
-    body.put("iii", number, style.type, 2 if style.gone else 0)
-    body.put("7d", *style.place, 0, 0, 0, 1)
-    body.put("3d", *style.scale)
-    body.put("4f", *(part / 255 for part in style.colour), style.alpha)
-    body.put("iI?", 0, 0, False)
 
 
 def _space(place: NDArray[Any] | None, z: float) -> tuple[float, float, float]:

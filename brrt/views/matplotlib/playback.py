@@ -42,9 +42,6 @@ class CurrentPaths(NamedTuple):
 class Playback:
     """The trees, cells, moves and paths of a run, after any of its events.
 
-    Args:
-        recording: The run.
-
     Raises:
         LogError: The events contradict each other.
     """

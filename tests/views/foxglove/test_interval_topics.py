@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrt.views.foxglove.interval_topics import interval_messages, topics
+from brrt.views.foxglove.interval_topics import _sizes, interval_messages
 
 
 @st.composite
@@ -30,7 +30,7 @@ def test_last_messages_hold_what_is_there(drawn: tuple[int, list[tuple[int, int]
     for instant in range(instants):
         while sent and sent[0].instant == instant:
             message = sent.pop(0)
-            assert 0 <= message.topic < topics(instants, batch)
+            assert 0 <= message.topic < 2 + _sizes(instants, batch)
             # No message repeats the one before it on its topic.
             assert message.items.tolist() != last.get(message.topic, [])
             last[message.topic] = message.items.tolist()

@@ -37,11 +37,7 @@ _MOVES_IN_3D = (2000, 20**3)
 
 
 class PathsDrawing:
-    """Draws paths and plots their costs.
-
-    Args:
-        canvas: Where they are drawn.
-    """
+    """Draws paths and plots their costs."""
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
@@ -116,12 +112,7 @@ def _changes(events: Events) -> list[tuple[Any, Stage | None]]:
 
 
 class MovesDrawing:
-    """Draws the moves of the robot: where it is, and its trace.
-
-    Args:
-        canvas: Where they are drawn.
-        manifest: The run's.
-    """
+    """Draws the moves of the robot: where it is, and its trace."""
 
     def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
         self._canvas = canvas

@@ -11,11 +11,7 @@ _ACCEPTED, _ITERATION_TIME = "/series/extensions/accepted", "/series/iteration_t
 
 
 class ExtensionsPlot:
-    """Plots the share of all extensions so far that was accepted, or rejected for each reason.
-
-    Args:
-        canvas: Where it is plotted.
-    """
+    """Plots the share of all extensions so far that was accepted, or rejected for each reason."""
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
@@ -48,11 +44,7 @@ class ExtensionsPlot:
 
 
 class IterationTimePlot:
-    """Plots the mean time of the iterations since the value before, a few hundred values in all.
-
-    Args:
-        canvas: Where it is plotted.
-    """
+    """Plots the mean time of the iterations since the value before, a few hundred values in all."""
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas, self._count = canvas, 0
