@@ -1,29 +1,28 @@
-"""Whether it helps to do what `brrt explain` advises: made cases, each over several seeds.
+"""Whether the advice of `brrt explain` helps: cases, each over several seeds.
 
 python benchmarks/advice.py            every case
-python benchmarks/advice.py bugtrap    those whose name has that in it
+python benchmarks/advice.py bugtrap    those with this in their name
 
-For each case: how often its own settings solve it, and their median work; then the same for each
-piece of advice, by the rule that gave it, on the seeds that got it. Work is extensions tried and
-cells expanded, smoothing aside.
+For each case: how often it is solved, and its median work; then the same after following each
+piece of advice, on the seeds that got it. Work is extensions and expansions, without smoothing.
 """
 
 import sys
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
 import numpy as np
 
-from brrt import BranchedRun, Memory, Recording, Run, Scenario, World, snapshot
+from brrt import BranchedRun, Recording, Run, Scenario, World
 from brrt.explanation import Advice, explain
 
 SEEDS = 10
 
 
 def walled_off() -> World:
-    """A goal behind four walls that leave no way in."""
+    """A goal within four walls without a gap."""
     boxes = [[60, 60, 95, 62], [60, 93, 95, 95], [60, 60, 62, 95], [93, 60, 95, 95]]
     start, goal = np.array([5.0, 5.0]), np.array([80.0, 80.0])
     sides = np.zeros(2), np.full(2, 100.0)
@@ -77,31 +76,24 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
 }  # fmt: skip
 
 
-def run(made: Run) -> tuple[dict[str, Any], Recording]:
-    """Run; return the figures and the recording."""
-    log = Memory()
-    figures = made.execute([log]).as_dict()
-    return figures, Recording(made.manifest, made.problem.world, lambda: iter(log.batches), None)
-
-
 def follow(advice: Advice, recording: Recording, world: World | None) -> dict[str, Any]:
-    """Do what is advised after a run; return the figures, those of the run's own start included."""
+    """Follow advice for a recording; return the metrics, the recorded part of a branch included."""
     if advice.branch is not None:
-        return run(BranchedRun(recording, **advice.branch))[0]
-    assert advice.scenario is not None  # noqa: S101 - what only looks is not followed
-    return run(Run(advice.scenario, world=world))[0]
+        return BranchedRun(recording, **advice.branch).execute().as_dict()
+    assert advice.scenario is not None  # noqa: S101 - commands that plan nothing are not followed
+    return Run(advice.scenario, world=world).execute().as_dict()
 
 
-def work(figures: dict[str, Any]) -> int:
-    """Extensions tried, and cells expanded."""
-    return int(figures["nodes"] + figures["rejects"] + figures["expanded"])
+def work(metrics: Mapping[str, Any]) -> int:
+    """Return the number of extensions and expansions."""
+    return int(metrics["nodes"] + metrics["rejects"] + metrics["expanded"])
 
 
-def told(name: str, runs: list[dict[str, Any]]) -> str:
-    """Sum up runs in a line."""
-    solved = [figures for figures in runs if figures["solved"]]
-    costs = f"  cost {median(f['path_cost'] for f in solved):8.5g}" if solved else ""
-    effort = median(work(figures) for figures in runs)
+def summary(name: str, runs: Sequence[Mapping[str, Any]]) -> str:
+    """Sum up the metrics of runs in a line."""
+    solved = [metrics for metrics in runs if metrics["solved"]]
+    costs = f"  cost {median(m['path_cost'] for m in solved):8.5g}" if solved else ""
+    effort = median(work(metrics) for metrics in runs)
     return f"{name:34} {len(solved):3} of {len(runs):2} solved  work {effort:9,.0f}{costs}"
 
 
@@ -111,24 +103,25 @@ def lines(case: str) -> Iterator[str]:
     before, after = [], defaultdict(list)
     for seed in range(SEEDS):
         scenario = Scenario(seed=seed, **values)
-        figures, recording = run(Run(scenario, world=world))
-        before.append(figures)
-        for advice in explain(snapshot(recording)).advice:
-            after[_changes(scenario, advice)].append((figures, recording, advice))
-    yield told(case, before)
+        recording = Run(scenario, world=world).record()
+        metrics = recording.result or {}
+        before.append(metrics)
+        for advice in explain(recording).advice:
+            after[_changes(scenario, advice)].append((metrics, recording, advice))
+    yield summary(case, before)
     for changes, given in after.items():
         if given[0][2].suffix != ".mcap":
             yield f"   {changes}: {len(given)} times"
             continue
-        yield told("   where advised: " + changes[:18], [figures for figures, _, _ in given])
+        yield summary("   where advised: " + changes[:18], [metrics for metrics, _, _ in given])
         done = [follow(advice, recording, world) for _, recording, advice in given]
-        yield told("   " + changes, done)
+        yield summary("   " + changes, done)
 
 
 def _changes(scenario: Scenario, advice: Advice) -> str:
-    """Name what a piece of advice changes."""
+    """Name what advice changes."""
     if advice.branch is not None:
-        return ", ".join([*advice.branch["settings"], *advice.branch["params"]]) + " (goes on)"
+        return ", ".join([*advice.branch["settings"], *advice.branch["params"]]) + " (continued)"
     if advice.scenario is None:
         return " ".join(advice.words[:3])
     old, new = scenario.as_dict(), advice.scenario.as_dict()
