@@ -44,7 +44,7 @@ class Settings:
         Raises:
             BrrtError: A value has the wrong type or lies outside its range.
         """
-        hints = get_type_hints(type(self))
+        hints = _hints(type(self))
         for f in _params(self):
             value = _typed(f.name, getattr(self, f.name), hints[f.name])
             _check_range(f.name, value, f.metadata)
@@ -65,7 +65,7 @@ class Settings:
         for name in values:
             if name not in names:
                 raise unknown(f"parameter of {owner}", name, names)
-        hints = get_type_hints(cls)
+        hints = _hints(cls)
         return cls(**{name: _typed(name, value, hints[name]) for name, value in values.items()})
 
     def as_dict(self) -> dict[str, Any]:
@@ -81,7 +81,7 @@ class Settings:
     @classmethod
     def describe(cls) -> list[dict[str, str]]:
         """Return one row for each setting: name, default, unit, range, doc."""
-        hints = get_type_hints(cls)
+        hints = _hints(cls)
         return [
             {
                 "name": f.name,
@@ -113,6 +113,16 @@ def parse_pairs(owner: str, text: str) -> dict[str, str]:
             raise BrrtError(f"{owner}: {name.strip()} is given twice; give it once")
         found[name.strip()] = value.strip()
     return found
+
+
+_HINTS: dict[type, dict[str, Any]] = {}
+
+
+def _hints(settings: type) -> dict[str, Any]:
+    """Return the types of the fields; working them out takes longer than making most settings."""
+    if settings not in _HINTS:
+        _HINTS[settings] = get_type_hints(settings)
+    return _HINTS[settings]
 
 
 def _params(settings: Any) -> list[Field[Any]]:
