@@ -279,7 +279,7 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
     assert brrt("plan", *where, "--iterations", 40, "--out", "run.mcap").code == 1
     done = brrt("plan", "--from", "run.mcap", "--iterations", 5000, "--out", "more.mcap")
     assert done.code == 0
-    assert "behind iteration 40; the" in done.err
+    assert "after iteration 40; the" in done.err
     brrt("plan", *where, "--iterations", 5000, "--out", "whole.mcap")
     assert brrt("replay", "more.mcap", "--check", "whole.mcap").code == 0
     at = ("--from", "run.mcap", "--at-iteration", 20, "--param", "step=1")
@@ -290,7 +290,7 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
     assert brrt("verify", "small.mcap").code == 0
     assert "at iteration 20 of run.mcap: step" in brrt("replay", "small.mcap", "--text").out
     for message, options in {
-        "is the recording that --from goes on from": ("--from", "run.mcap", "--out", "run.mcap"),
+        "is the recording that --from continues": ("--from", "run.mcap", "--out", "run.mcap"),
         "say where to branch": ("--at-event", 3),
         "leave out x.toml": ("x.toml", "--from", "run.mcap"),
         "keeps the planner of its recording": ("--from", "run.mcap", "--planner", "rrt"),

@@ -88,7 +88,7 @@ def test_a_failed_run_gets_more_iterations(planner: str) -> None:
 
 @pytest.mark.parametrize("lookahead", [1, 5])
 def test_more_trials(lookahead: int) -> None:
-    """A robot that arrived starts over with what it learnt, as with more trials from the start."""
+    """A robot that arrived starts over with what it learned, as with more trials from the start."""
     scenario = replace(CAVE, params={**CAVE.params, "lookahead": lookahead})
     recording, _ = parent(scenario)
     with pytest.raises(BrrtError, match=r"ended with its path at .*, or let it start over"):

@@ -1,4 +1,4 @@
-"""Somebody else's planner: it runs, is recorded, read, drawn and checked without its class."""
+"""Planners that are not registered: their runs are recorded, read, drawn and verified."""
 
 import re
 from collections.abc import Callable
@@ -23,7 +23,7 @@ FOREIGN = Scenario(
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[Path]:
-    """A recording of a planner that brrt does not know, in both formats."""
+    """Record a planner that states no contract, in both formats."""
     run = Run(FOREIGN, planner=Silent())
     paths, world = [tmp_path / "their.mcap", tmp_path / "their.rrd"], run.problem.world
     run.execute(
@@ -33,7 +33,7 @@ def files(tmp_path: Path) -> list[Path]:
 
 
 def test_recordings_need_no_class(brrt: Callable[..., Result], files: list[Path]) -> None:
-    """They replay, verify and draw; verify says what it could not check."""
+    """They replay, verify and draw without the class; verify says what it did not check."""
     for path in files:
         recording = read(path)
         assert recording.manifest.scenario == FOREIGN
@@ -52,7 +52,7 @@ def test_recordings_need_no_class(brrt: Callable[..., Result], files: list[Path]
 
 
 def test_verify(brrt: Callable[..., Result], tmp_path: Path) -> None:
-    """Exit 0 where all holds, 1 with the event where something is broken, 2 for no recording."""
+    """Exit code 0 if all rules hold, 1 with the event if one is broken, 2 for no recording."""
     run, log = recorded(Scenario(world="circles2d:n=40,seed=3", seed=7, clock="logical"))
     edges = log[Kind.EDGE].copy()
     edges["cost"][-1] += 1
@@ -74,7 +74,7 @@ def test_verify(brrt: Callable[..., Result], tmp_path: Path) -> None:
 
 
 def test_a_planner_of_ones_own_is_named() -> None:
-    """A log never blames brrt's planner for somebody else's; brrt's own states its settings."""
+    """It cannot have the name of a registered planner; a registered one states its settings."""
     with pytest.raises(BrrtError, match="planner rrt is brrt's own; name yours"):
         Run(Scenario(), planner=TOYS["pair"])
     run = Run(Scenario(), planner=RRT(step=3.0))
@@ -97,7 +97,7 @@ def test_a_planner_of_ones_own_is_named() -> None:
     ],
 )  # fmt: skip
 def test_wrong_fields_are_named(kind: Kind, fields: dict[str, Any], message: str) -> None:
-    """One line that names the kind, the field and what it should be; nothing is recorded."""
+    """The message names the kind and the field; nothing is recorded."""
     log = EventLog(2, 4)
     with pytest.raises(BrrtError) as error:
         log.emit(kind, 0, **fields)
@@ -107,7 +107,7 @@ def test_wrong_fields_are_named(kind: Kind, fields: dict[str, Any], message: str
 
 
 def test_a_full_batch_is_named() -> None:
-    """Whoever forgets to drain is told."""
+    """A planner that does not drain the log gets an error."""
     log = EventLog(2, 1)
     log.emit(Kind.PHASE, 0, name=Phase.PLAN, status=Status.BEGIN)
     with pytest.raises(BrrtError, match=r"the batch is full; yield log\.drain"):
@@ -115,7 +115,7 @@ def test_a_full_batch_is_named() -> None:
 
 
 def moved(times_s: list[float], trials: list[int]) -> Events:
-    """A log whose moves come at these times; planning begins at 10 s."""
+    """Return a log with moves at these times; planning begins at 10 s."""
     phases = np.zeros(1, table_dtype(Kind.PHASE, 2))
     phases["t"] = 10**10
     moves = np.zeros(len(trials), table_dtype(Kind.MOVE, 2))
@@ -126,7 +126,7 @@ def moved(times_s: list[float], trials: list[int]) -> Events:
 
 @pytest.mark.parametrize("size", [1, 2, 3, 10])
 def test_figures_of_moves(size: int) -> None:
-    """Each move's time counts from the move before, over batches too; deadlines are 2 s."""
+    """The time of a move counts from the move before, across batches; deadlines are 2 s."""
     log = moved([11, 15.5, 16, 18, 18.1], [0, 0, 0, 1, 1])
     run, _ = recorded(Scenario(world="circles2d:n=40,seed=3", seed=7, clock="logical"))
     metrics = Metrics(run.manifest)
@@ -145,7 +145,7 @@ def test_figures_of_moves(size: int) -> None:
 
 
 def test_first_and_best_path() -> None:
-    """The first path's figures stay; the path is the best one."""
+    """The metrics of the first path stay; the path is the best one."""
     memory, toy = Memory(), TOYS["star"]
     scenario = replace(FOREIGN, iterations=150, smooth=False, world="circles2d:n=6,seed=5", seed=5)
     figures = Run(scenario, planner=toy).execute([memory]).as_dict()
@@ -162,7 +162,7 @@ def test_first_and_best_path() -> None:
 
 
 def test_replay_prints_the_trees_as_rewired(brrt: Callable[..., Result], tmp_path: Path) -> None:
-    """The depth on the screen is that of the tree after its rewires."""
+    """The printed depth is that of the tree after its rewires."""
     run, memory = Run(replace(FOREIGN, smooth=False), planner=TOYS["star"]), Memory()
     run.execute([memory, McapSink(tmp_path / "star.mcap", run.manifest, run.problem.world)])
     log = memory.events()
@@ -174,10 +174,10 @@ def test_replay_prints_the_trees_as_rewired(brrt: Callable[..., Result], tmp_pat
 
 
 class Babble:
-    """Begins well and then says what no event can say.
+    """Emit an impossible event in the second batch.
 
     Args:
-        kind: Of what it says last.
+        kind: Kind of the impossible event.
         fields: Its fields.
     """
 
@@ -205,7 +205,7 @@ class Babble:
     ids=["phase", "status", "source", "not a number", "stage"],
 )
 def test_what_no_event_can_say(planner: Babble, message: str, tmp_path: Path) -> None:
-    """It is an error at once, whatever the sink; what was said before it can be read."""
+    """It is an error at once with any sink; the events before it can be read."""
     run = Run(replace(FOREIGN, smooth=False), planner=Babble(Kind.PHASE, name=0, status=5))
     run._planner = planner  # a run compiles by trying the planner
     paths, world = [tmp_path / "x.mcap", tmp_path / "x.rrd"], run.problem.world
