@@ -1,4 +1,4 @@
-"""Settings that check themselves."""
+"""Settings are converted, checked and described."""
 
 import math
 from dataclasses import FrozenInstanceError, dataclass
@@ -28,7 +28,7 @@ class Sample(Settings):
 
 
 def test_defaults() -> None:
-    """Without values the defaults hold."""
+    """Without values the defaults are used."""
     assert Sample.parse("sample", {}) == Sample()
     assert Sample().as_dict() == {
         "count": 3, "size": 1.5, "part": 0.25, "range": None, "keep": False, "mode": "slow",
@@ -60,7 +60,7 @@ def test_defaults() -> None:
     ],
 )
 def test_values_are_brought_to_their_type(name: str, given: Any, value: Any) -> None:
-    """Texts, as from a command line, and near types become the type declared."""
+    """Strings and similar types are converted to the declared type."""
     found = getattr(Sample.parse("sample", {name: given}), name)
     assert found == value
     assert type(found) is type(value)
@@ -102,7 +102,7 @@ def test_values_are_brought_to_their_type(name: str, given: Any, value: Any) -> 
     ],
 )
 def test_errors_name_the_setting_and_the_value(name: str, given: Any, message: str) -> None:
-    """What is of no use is refused in one line, in Python and from texts alike."""
+    """Wrong values are refused in one line, both from Python and from strings."""
     with pytest.raises(BrrtError) as parsed:
         Sample.parse("sample", {name: given})
     with pytest.raises(BrrtError) as made:
@@ -121,14 +121,14 @@ def test_errors_name_the_setting_and_the_value(name: str, given: Any, message: s
     ],
 )
 def test_unknown_names(name: str, hint: str) -> None:
-    """A misspelt setting is an error that names the nearest, never ignored."""
+    """An unknown setting is an error that names the nearest one."""
     with pytest.raises(BrrtError, match="unknown parameter of planner x") as error:
         Sample.parse("planner x", {name: 1})
     assert hint in str(error.value)
 
 
 def test_settings_cannot_be_changed() -> None:
-    """Settings are values."""
+    """Settings are immutable and hashable."""
     settings = Sample()
     with pytest.raises(FrozenInstanceError):
         settings.count = 4  # type: ignore[misc]
@@ -136,7 +136,7 @@ def test_settings_cannot_be_changed() -> None:
 
 
 def test_describe() -> None:
-    """The table of settings says name, default, unit, range and meaning."""
+    """The table of settings has name, default, unit, range and meaning."""
     rows = {row["name"]: row for row in Sample.describe()}
     assert list(rows) == ["count", "size", "part", "range", "keep", "mode"]
     assert rows["count"] == {
@@ -154,7 +154,7 @@ ALL_SETTINGS = [*PLANNERS.values(), *GENERATORS.values(), Shortcut]
 
 @pytest.mark.parametrize("settings", ALL_SETTINGS, ids=lambda cls: cls.__name__)
 def test_every_description_is_complete_and_parses(settings: type[Settings]) -> None:
-    """Each setting has a meaning, and each default can be given as it is printed."""
+    """Each setting has a meaning, and each printed default can be parsed."""
     rows = settings.describe()
     assert all(row["doc"] and row["name"] for row in rows)
     printed = {row["name"]: row["default"] for row in rows}
@@ -164,7 +164,7 @@ def test_every_description_is_complete_and_parses(settings: type[Settings]) -> N
 
 @given(st.integers(0, 10), st.floats(1e-300, 1e300), st.booleans(), st.none() | st.floats(1e-9, 9))
 def test_round_trips(count: int, size: float, keep: bool, far: float | None) -> None:
-    """as_dict and parse are inverse, also by way of text."""
+    """as_dict and parse are inverse, also through strings."""
     settings = Sample(count=count, size=size, keep=keep, range=far)
     assert Sample.parse("sample", settings.as_dict()) == settings
     texts = {name: "auto" if x is None else str(x) for name, x in settings.as_dict().items()}
@@ -178,7 +178,7 @@ def test_round_trips(count: int, size: float, keep: bool, far: float | None) -> 
     )
 )
 def test_any_value_is_used_or_refused(values: dict[str, Any]) -> None:
-    """No value of a plain type leads to anything but settings in range or a BrrtError."""
+    """Any value gives settings in range or a BrrtError."""
     try:
         settings = Sample.parse("sample", values)
     except BrrtError:

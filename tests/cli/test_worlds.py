@@ -1,4 +1,4 @@
-"""`brrt worlds`, as a user types it: what it says and draws is true of the world."""
+"""`brrt worlds` from the command line: its output describes the world correctly."""
 
 import json
 import os
@@ -30,7 +30,7 @@ WORLDS = pytest.mark.parametrize(
 
 
 def hand_made(**changes: Any) -> World:
-    """Every kind of obstacle in 2D, turned cells and a thin line among them."""
+    """A 2D world with every kind of obstacle, including a rotated grid and a line segment."""
     cells = np.zeros((14, 14), bool)
     cells[3:9, 4], cells[3, 4:8] = True, True
     grid = Grid(cells, np.array([2.0, -2]), 1.0, 0.3)
@@ -52,7 +52,7 @@ def hand_made(**changes: Any) -> World:
 
 
 def test_the_list_begins_with_a_line_for_each(brrt: Command) -> None:
-    """An overview, then every parameter; the command alone says the same."""
+    """An overview, then every parameter; `brrt worlds` without a subcommand prints the same."""
     text = brrt("worlds", "list").out
     assert brrt("worlds").out == text
     lines = text.splitlines()
@@ -68,7 +68,7 @@ def test_the_list_begins_with_a_line_for_each(brrt: Command) -> None:
 
 
 def test_one_generator_alone(brrt: Command) -> None:
-    """Its parameters and no one else's, for people and for programs."""
+    """Only its own parameters, as text and as JSON."""
     text = brrt("worlds", "list", "polygons2d").out
     assert "max_corners" in text
     assert "max_side" not in text
@@ -87,7 +87,7 @@ def test_one_generator_alone(brrt: Command) -> None:
 
 @WORLDS
 def test_what_is_shown_is_true(spec: str, brrt: Command) -> None:
-    """Figures agree with the world and with each other, as text and as JSON."""
+    """Text and JSON agree with the world and with each other."""
     world, seen = make_world(spec), brrt("worlds", "show", spec, "--json").json
     assert seen["world"] == spec
     assert (seen["dim"], seen["balls"]) == (world.dim, len(world.balls))
@@ -108,7 +108,7 @@ def test_what_is_shown_is_true(spec: str, brrt: Command) -> None:
 
 
 def test_every_kind_of_obstacle_is_counted(brrt: Command) -> None:
-    """Rectangles, line segments and cells have names of their own."""
+    """Rectangles, line segments and cells are counted separately."""
     hand_made().save("w.json")
     text = brrt("worlds", "show", "w.json").out
     words = " ".join(text.split())
@@ -122,7 +122,7 @@ def test_every_kind_of_obstacle_is_counted(brrt: Command) -> None:
 
 
 def drawing(text: str) -> list[str]:
-    """The lines within the first frame."""
+    """Return the lines within the first frame."""
     lines = text.splitlines()
     top = next(i for i, line in enumerate(lines) if line[:1] in ("┌", "+"))
     width = 1 + min(lines[top].find(end, 1) for end in "┐+" if lines[top].find(end, 1) > 0)
@@ -138,7 +138,7 @@ def drawing(text: str) -> list[str]:
 def test_the_sketch_is_the_world(
     columns: int, brrt: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Dark where obstacles are, S and G where they stand, no wider than the terminal."""
+    """Dark at obstacles, S and G at start and goal, at most as wide as the terminal."""
     world = World("w", np.zeros(2), np.array([20.0, 10]), boxes=np.array([[10.0, 5, 20, 10]]))
     world.save("w.json")
     monkeypatch.setattr(import_module("brrt_cli.console").console(), "_width", columns)
@@ -162,7 +162,7 @@ def test_the_sketch_is_the_world(
 
 
 def test_a_thin_line_is_seen(brrt: Command) -> None:
-    """A segment without any width crosses the sketch from side to side."""
+    """A line segment is visible from side to side."""
     line = np.array([[0.0, 3], [10, 8.3]])
     World("line", np.zeros(2), np.full(2, 10.0), polygons=(line,)).save("w.json")
     columns = zip(*drawing(brrt("worlds", "show", "w.json").out), strict=True)
@@ -182,7 +182,7 @@ def test_a_world_in_3d_is_seen_from_two_sides(brrt: Command) -> None:
 
 
 def test_a_pipe_gets_the_sketch_without_colours(shell: Command) -> None:
-    """Block characters, but no escape codes."""
+    """Output to a pipe has block characters but no escape codes."""
     done = shell("worlds", "show", "polygons2d:n=20")
     assert done.code == 0, done.err
     assert "█" in done.out
@@ -190,7 +190,7 @@ def test_a_pipe_gets_the_sketch_without_colours(shell: Command) -> None:
 
 
 def test_a_terminal_that_has_ascii_alone_gets_letters(tmp_path: Path) -> None:
-    """No character that such a terminal cannot show, and no traceback for one."""
+    """Only characters of the terminal's encoding are used."""
     env = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "60"}
     done = subprocess.run(
         [sys.executable, "-m", "brrt_cli", "worlds", "show", "polygons2d:n=20"],
@@ -203,7 +203,7 @@ def test_a_terminal_that_has_ascii_alone_gets_letters(tmp_path: Path) -> None:
 
 
 def test_ways_are_told_as_they_are(brrt: Command) -> None:
-    """Yes, no and unknown; a start that is of no use is named."""
+    """Yes, no and unknown; the reason names a start within an obstacle."""
     wall = np.array([[5.0, -1, 5.1, 11]])
     World("wall", np.zeros(2), np.full(2, 10.0), boxes=wall).save("w.json")
     ends = ("--start", "1,1", "--goal", "9,9")
@@ -220,7 +220,7 @@ def test_ways_are_told_as_they_are(brrt: Command) -> None:
 
 
 def seen_at(pixels: NDArray[np.uint8], colour: Colour) -> NDArray[np.float64]:
-    """Where a mark stands: the middle of the pixels of its colour; column and row."""
+    """Return column and row of a marker: the mean of the pixels of its colour."""
     rows, columns = np.nonzero((np.abs(pixels.astype(int) - colour) < 40).all(axis=2))
     assert len(rows) > 20, colour
     return np.array([columns.mean(), rows.mean()])
@@ -238,7 +238,7 @@ def seen_at(pixels: NDArray[np.uint8], colour: Colour) -> NDArray[np.float64]:
     ids=["circles", "polygons", "squares", "hand-made", "long"],
 )
 def test_a_picture_shows_what_is_blocked(world: World, brrt: Command) -> None:
-    """Start and goal say which pixel is which point: there, dark and blocked are the same."""
+    """With the markers as reference points, dark pixels are blocked points."""
     world.save("w.json")
     assert world.start is not None
     assert world.goal is not None
@@ -260,7 +260,7 @@ def test_a_picture_shows_what_is_blocked(world: World, brrt: Command) -> None:
 
 
 def test_a_picture_in_3d_has_obstacles_and_both_ends(brrt: Command) -> None:
-    """More boxes, more grey; start and goal are seen through them."""
+    """More boxes give more grey; start and goal are visible through them."""
     shares = []
     for n in (10, 150):
         assert brrt("worlds", "show", f"boxes3d:n={n}", "--out", "w.png", "--force").code == 0
@@ -274,7 +274,7 @@ def test_a_picture_in_3d_has_obstacles_and_both_ends(brrt: Command) -> None:
 
 @pytest.mark.parametrize(("ending", "begin"), [("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_other_kinds_of_picture(ending: str, begin: bytes, brrt: Command) -> None:
-    """They begin as such files do, and are the same each time."""
+    """Files have the right magic bytes and are equal each time."""
     for name in ("a", "b"):
         brrt("worlds", "show", "circles2d", "--out", f"{name}.{ending}")
     assert Path(f"a.{ending}").read_bytes().startswith(begin)
@@ -284,7 +284,7 @@ def test_other_kinds_of_picture(ending: str, begin: bytes, brrt: Command) -> Non
 def test_without_matplotlib_one_line_says_so(
     brrt: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is an extra; everything else works without it."""
+    """Matplotlib is optional; everything else works without it."""
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     done = brrt("worlds", "show", "circles2d", "--out", "w.png")
     assert_refused(done, "pip install 'brrt[plot]'")
@@ -293,7 +293,7 @@ def test_without_matplotlib_one_line_says_so(
 
 
 def test_a_rerun_file_holds_the_world(brrt: Command) -> None:
-    """Its obstacles and marks, and nothing of a run."""
+    """The file has obstacles and markers, and nothing of a run."""
     hand_made().save("w.json")
     assert brrt("worlds", "show", "w.json", "--rrd", "w.rrd").code == 0
     entities = {chunk.entity_path for chunk in RrdReader("w.rrd").stream()}
@@ -305,7 +305,7 @@ def test_a_rerun_file_holds_the_world(brrt: Command) -> None:
 
 
 def test_rerun_draws_no_world_beyond_its_numbers(brrt: Command) -> None:
-    """Single precision ends where worlds do not."""
+    """Rerun draws in single precision; worlds have double precision."""
     World("far", np.zeros(2), np.full(2, 1e90)).save("w.json")
     assert_refused(brrt("worlds", "show", "w.json", "--rrd", "w.rrd"), "single precision")
     assert not Path("w.rrd").exists()
@@ -316,7 +316,7 @@ def test_rerun_draws_no_world_beyond_its_numbers(brrt: Command) -> None:
 
 @WORLDS
 def test_a_world_that_was_made_is_the_same_world(spec: str, brrt: Command) -> None:
-    """Bit by bit, and planning in it gives the same."""
+    """The saved world is equal bit by bit, and so is planning in it."""
     done = brrt("worlds", "make", spec, "--out", "w.json")
     assert done.code == 0
     assert "--world w.json" in done.out
@@ -331,7 +331,7 @@ def test_a_world_that_was_made_is_the_same_world(spec: str, brrt: Command) -> No
 
 
 def test_ends_that_are_given_are_saved(brrt: Command) -> None:
-    """They stand in the file, and a generator keeps them free."""
+    """Given ends are saved, and generators keep them free."""
     brrt(
         "worlds", "make", "circles2d:n=90", "--start", "50,50", "--goal", "10,90", "--out", "w.json"
     )
@@ -343,7 +343,7 @@ def test_ends_that_are_given_are_saved(brrt: Command) -> None:
 
 
 def test_a_file_is_never_half_written(brrt: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where writing fails, what stood there still does, and nothing else is left."""
+    """If writing fails, the old file remains and no other file is left."""
     brrt("worlds", "make", "circles2d", "--out", "w.json")
     before = Path("w.json").read_bytes()
 
@@ -359,7 +359,7 @@ def test_a_file_is_never_half_written(brrt: Command, monkeypatch: pytest.MonkeyP
 
 
 def test_names_are_printed_as_they_are(brrt: Command) -> None:
-    """Brackets are no markup, and a long name is not broken."""
+    """Brackets are not interpreted as markup, and long names are not wrapped."""
     name = "[bold]" + 100 * "x"
     done = brrt("worlds", "make", "circles2d", "--out", f"{name}.json")
     assert done.out.count(f"{name}.json") == 2
@@ -372,7 +372,7 @@ def test_names_are_printed_as_they_are(brrt: Command) -> None:
 
 
 def assert_refused(done: Result, *words: str) -> None:
-    """One line on stderr that says so, and exit code 2."""
+    """Bad input gives one line on stderr and exit code 2."""
     assert done.code == 2, (done.out, done.err)
     assert done.out == ""
     assert len(done.err.splitlines()) == 1, done.err
@@ -404,13 +404,13 @@ def assert_refused(done: Result, *words: str) -> None:
 def test_bad_input_is_one_line(
     args: tuple[str, ...], words: tuple[str, ...], brrt: Command
 ) -> None:
-    """Nothing is written."""
+    """Nothing is written without --force."""
     assert_refused(brrt("worlds", *args), *words)
     assert not list(Path().iterdir())
 
 
 def test_files_are_not_overwritten_unasked(brrt: Command) -> None:
-    """With --force they are."""
+    """With --force, existing files are replaced."""
     for command in (
         ("make", "circles2d", "--out", "w.json"),
         ("show", "circles2d", "--out", "w.png"),
@@ -425,7 +425,7 @@ def test_files_are_not_overwritten_unasked(brrt: Command) -> None:
 
 
 def test_a_world_made_by_hand_is_planned_in(tmp_path: Path) -> None:
-    """Obstacles as lists; the recording has the world, and every check holds."""
+    """Obstacles may be lists; the recording contains the world, and verification passes."""
     world = hand_made(name="my world")
     run = Run(Scenario(seed=3, iterations=20_000), world=world)
     memory, sink = Memory(), McapSink(tmp_path / "run.mcap", run.manifest, run.problem.world)
@@ -438,7 +438,7 @@ def test_a_world_made_by_hand_is_planned_in(tmp_path: Path) -> None:
 
 
 def test_a_world_is_described_in_a_line() -> None:
-    """However much is in it."""
+    """Worlds with many obstacles have a repr of one line."""
     text = repr(make_world("boxes3d:n=10000,max_side=3"))
     assert text == (
         "<World 'boxes3d:n=10000,max_side=3'; 0, 0, 0 to 100, 100, 100; 10000 boxes; "
@@ -448,7 +448,7 @@ def test_a_world_is_described_in_a_line() -> None:
 
 
 def test_a_plot_is_put_where_it_is_asked_for() -> None:
-    """Into axes of one's own, or new ones; flat axes take no world in 3D."""
+    """`plot_world` draws into given or new axes; a 3D world needs 3D axes."""
     import matplotlib as mpl
 
     mpl.use("agg")
@@ -468,7 +468,7 @@ def test_a_plot_is_put_where_it_is_asked_for() -> None:
 def test_notes_are_said_and_not_saved(
     brrt: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """On stderr by each command that makes the world; --json has them too."""
+    """Each command that makes the world prints its notes on stderr; --json includes them."""
     lines = ["boundary 0 0 0 10 10 10", "block 1 1 1 2 2 12"]
     (tmp_path / "map.txt").write_text("\n".join(lines))
     noted = load_world("map.txt").notes

@@ -1,4 +1,4 @@
-"""The gate: exact chances, few false alarms, and files of figures that are read or refused."""
+"""The gate: exact p-values, few false alarms, and files of metrics."""
 
 import json
 import math
@@ -24,7 +24,7 @@ VERSIONS = {"brrt": "0.1.0"}
 
 
 def naive_ranks(sizes: list[float]) -> list[float]:
-    """The mean place among all, counted from 1."""
+    """Return the mean rank of each value, from 1."""
     return [
         sum(a < size for a in sizes) + (1 + sum(a == size for a in sizes)) / 2 for size in sizes
     ]
@@ -32,7 +32,7 @@ def naive_ranks(sizes: list[float]) -> list[float]:
 
 @given(st.lists(NUMBERS, max_size=9))
 def test_signed_rank_counts_all_signs(differences: list[float]) -> None:
-    """The share of all ways to toss the signs with as large a rank sum."""
+    """The p-value is the share of all sign assignments with at least this rank sum."""
     told = [each for each in differences if each]
     places = naive_ranks([abs(each) for each in told])
     seen = sum(rank for rank, each in zip(places, told, strict=True) if each > 0)
@@ -47,7 +47,7 @@ def test_signed_rank_counts_all_signs(differences: list[float]) -> None:
 
 @given(st.integers(0, 30), st.integers(0, 30))
 def test_sign_test_counts_all_tosses(worse: int, better: int) -> None:
-    """P(at least as many) and P(fewer) make one."""
+    """P(at least k) and P(fewer than k) add up to 1."""
     assert paired_tests.sign_test(worse, better) == pytest.approx(
         1 - (paired_tests.sign_test(better + 1, worse - 1) if worse else 0)
     )
@@ -56,7 +56,7 @@ def test_sign_test_counts_all_tosses(worse: int, better: int) -> None:
 
 @given(st.integers(0, 10**6), st.integers(6, 25), st.sampled_from([0.01, 0.05]))
 def test_what_is_proven_is_what_the_test_rejects(seed: int, n: int, alpha: float) -> None:
-    """A margin below what is proven fails, one above passes."""
+    """The test rejects a shift below the confidence bound and not one above it."""
     differences = np.random.default_rng(seed).normal(0.3, 1, n)
     bound = paired_tests.lower_bound(differences, alpha)
     if not math.isfinite(bound):
@@ -67,14 +67,14 @@ def test_what_is_proven_is_what_the_test_rejects(seed: int, n: int, alpha: float
 
 
 def test_log_ratios_at_the_ends() -> None:
-    """Zero and infinity are figures too; two of the same say nothing."""
+    """Zero and infinity are valid; equal values have ratio 1."""
     old, new = np.array([0, 0, 1, 1, np.inf, np.inf]), np.array([0, 1, 0, np.inf, 1, np.inf])
     inf = math.inf
     assert paired_tests.log_ratios(old, new).tolist() == [0, inf, -inf, inf, -inf, 0]
 
 
 def made(columns: dict[str, Any]) -> SeedMetrics:
-    """SeedMetrics at hand; `solved` unless it is said."""
+    """Make metrics from columns; all runs are solved by default."""
     n = len(next(iter(columns.values())))
     columns = {"solved": [True] * n, **columns}
     runs = {i: {name: values[i] for name, values in columns.items()} for i in range(n)}
@@ -82,7 +82,7 @@ def made(columns: dict[str, Any]) -> SeedMetrics:
 
 
 def drawn(rng: np.random.Generator, n: int, scale: float, shared: Any) -> SeedMetrics:
-    """A skewed cost, a heavy-tailed count with ties that grows with it, and paths not found."""
+    """Draw a skewed cost, a correlated heavy-tailed count with ties, and some unsolved runs."""
     noise = rng.normal(size=n)
     return made(
         {
@@ -94,7 +94,7 @@ def drawn(rng: np.random.Generator, n: int, scale: float, shared: Any) -> SeedMe
 
 
 def judged(new: SeedMetrics, old: SeedMetrics, alpha: float, margin: float) -> Verdict:
-    """Judge both figures of `drawn`."""
+    """Judge both metrics of `drawn`."""
     return judge(new, old, alpha=alpha, name="it", margins={"cost": margin, "count": margin})
 
 
@@ -116,7 +116,7 @@ def test_false_alarms_are_as_rare_as_stated(*, paired: bool) -> None:
 
 
 def test_what_is_worse_is_found() -> None:
-    """With 20 seeds, 30 % beyond the margin, or half of the paths gone."""
+    """With 20 seeds the gate finds costs 40 % higher, and half of the paths lost."""
     rng = np.random.default_rng(2)
     old = drawn(rng, 20, 1.0, 0.0)
     found = judged(drawn(rng, 20, 1.4, 0.0), old, 0.01, 0.02)
@@ -138,7 +138,7 @@ def test_what_is_worse_is_found() -> None:
 
 
 def test_the_same_pass_at_once() -> None:
-    """To the last bit, whatever the margin; and the verdict says so in a line."""
+    """Equal metrics pass with any margin, and the verdict is one line."""
     scenario = brrt.Scenario(world="circles2d:n=40,seed=3", smooth=False)
     found = gate(scenario, scenario, seeds=12, cost=0, iterations=0, alpha=0.01)
     assert found.passed
@@ -148,7 +148,7 @@ def test_the_same_pass_at_once() -> None:
 
 
 def test_lines_fit_the_screen_and_json_is_json() -> None:
-    """Also with numbers that are large, zero or missing."""
+    """Numbers may be large, zero or missing."""
     new = made({"solved": [i > 3 for i in range(20)], "cost": [1e300] * 20, "rewires": [0] * 20})
     old = made({"cost": [1e-300] * 20, "rewires": [0] * 20})
     verdict = judge(new, old, alpha=1e-3, name="it", margins={"cost": 9.99, "rewires": 0})
@@ -157,7 +157,7 @@ def test_lines_fit_the_screen_and_json_is_json() -> None:
 
 
 def test_figures_are_kept(tmp_path: Path) -> None:
-    """Written and read they are the same; a line a seed."""
+    """A saved file is read back equal and has one line for each seed."""
     figures = SeedMetrics.of(lambda seed: brrt.Run(brrt.Scenario(seed=seed, smooth=False)), [3, 1])
     path = tmp_path / "new" / "figures.json"
     figures.save(path)
@@ -185,7 +185,7 @@ def test_figures_are_kept(tmp_path: Path) -> None:
     ],
 )
 def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> None:
-    """In one line that names the file."""
+    """The error is one line that names the file."""
     path = tmp_path / "figures.json"
     path.write_text(text)
     with pytest.raises(brrt.BrrtError, match=message) as error:
@@ -229,6 +229,6 @@ WHOLE, NONE = made({"cost": [1.0] * 20}), made({"solved": [False] * 20})
     ],
 )
 def test_bad_questions_are_refused(call: Callable[[], Verdict], message: str) -> None:
-    """In one line."""
+    """The error is one line."""
     with pytest.raises(brrt.BrrtError, match=message):
         call()

@@ -1,4 +1,4 @@
-"""Golden recordings replay, and are planned anew to the same events."""
+"""Golden recordings replay, and planning them again gives the same events."""
 
 import importlib.util
 import os
@@ -19,7 +19,7 @@ FILES = sorted(RECORDINGS.glob("*.mcap"))
 
 @pytest.fixture
 def golden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Load the script, working on a copy of the recordings."""
+    """Load the script with a copy of the recordings."""
     monkeypatch.delenv("CI", raising=False)
     copy = tmp_path / "recordings"
     shutil.copytree(RECORDINGS, copy, ignore=shutil.ignore_patterns("__pycache__"))
@@ -32,14 +32,14 @@ def golden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 def run(golden: ModuleType, monkeypatch: pytest.MonkeyPatch, *args: str) -> int:
-    """Call the script as a user does."""
+    """Call the script with command line arguments."""
     monkeypatch.setattr(sys, "argv", ["golden.py", *args])
     return int(golden.main())
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_replays_to_the_figures_it_holds(path: Path) -> None:
-    """The fold over the events gives what the writer found; a newer brrt has more figures."""
+    """Replay gives the stored metrics; a newer brrt may have additional ones."""
     recording = brrt.read(path)
     figures = brrt.metrics(recording).as_dict()
     assert recording.result is not None
@@ -50,7 +50,7 @@ def test_replays_to_the_figures_it_holds(path: Path) -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_plans_to_the_same_events(path: Path) -> None:
-    """The manifest's scenario, run again, makes the same events bit by bit."""
+    """Running the manifest's scenario gives the same events bit by bit."""
     recording = brrt.read(path)
     fresh = brrt.Run(recording.manifest.scenario)
     found = brrt.first_difference(recording.batches(), fresh.events())
@@ -58,20 +58,20 @@ def test_plans_to_the_same_events(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
-def test_told_as_it_was(path: Path) -> None:
-    """The account of the events is the one that is kept, word for word."""
+def test_transcripts_are_the_stored_ones(path: Path) -> None:
+    """The transcript equals the stored one."""
     assert brrt.transcript(brrt.read(path)) == path.with_suffix(".txt").read_text("utf-8")
 
 
 def test_manifest_makes_them(golden: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each file is what its command writes, and each has one."""
+    """Each file is what its command in the manifest writes."""
     assert run(golden, monkeypatch, "check") == 0
 
 
-def test_update_renews_and_says_so(
+def test_update_renews_and_reports(
     golden: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A changed recording is found, named, renewed, and then the same."""
+    """`check` reports a changed recording, and `update` renews it."""
     manifest = golden.FOLDER / "manifest.toml"
     manifest.write_text(manifest.read_text().replace("--seed 7", "--seed 8"))
     assert run(golden, monkeypatch, "check", "circles2d-rrt") == 1
@@ -81,7 +81,7 @@ def test_update_renews_and_says_so(
 
 
 def test_missing_unused_and_ci(golden: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A missing or an unused file fails; CI never renews."""
+    """A missing or an unused file fails; `update` refuses in CI."""
     (golden.FOLDER / "circles2d-rrt.mcap").rename(golden.FOLDER / "stray.mcap")
     assert golden.strays() == [
         "stray.mcap: not in manifest.toml",

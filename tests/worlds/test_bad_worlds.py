@@ -1,4 +1,4 @@
-"""Files that are no worlds: one line, exit code 2, bounded memory and time."""
+"""Files that are not worlds: one line, exit code 2, bounded memory and time."""
 
 import json
 import os
@@ -27,14 +27,14 @@ def folder(tmp_path: Path) -> Path:
     "content", [b"", bytes(range(256)) * 9, b"\0" * 5000, b"\xff\xfe\0a", b"\n" * 9, b"#" * 99]
 )
 def test_no_worlds(name: str, content: bytes, tmp_path: Path) -> None:
-    """Empty, binary and blank files, under every ending and none."""
+    """Empty, binary and blank files with every suffix and none are refused."""
     (tmp_path / name).write_bytes(content)
     assert refused(lambda: make_world(str(tmp_path / name))).startswith(str(tmp_path / name))
 
 
 @pytest.mark.parametrize("name", GOOD)
 def test_folders_missing_and_locked_files(name: str, tmp_path: Path) -> None:
-    """The message is the system's own."""
+    """The message is the operating system's."""
     path = tmp_path / name
     assert "No such file or directory" in refused(lambda: make_world(str(path)))
     path.mkdir()
@@ -73,7 +73,7 @@ for spec in sys.argv[1:]:
 
 
 def watched(*specs: Path | str) -> list[tuple[str, int, float]]:
-    """What loading each says, the MB that all up to it take above brrt itself, and its seconds."""
+    """Return message, peak memory so far in MB above brrt's own, and seconds of each file."""
     done = subprocess.run(
         [sys.executable, "-c", WATCHED, *map(str, specs)],
         capture_output=True, text=True, check=False, timeout=100,
@@ -85,7 +85,7 @@ def watched(*specs: Path | str) -> list[tuple[str, int, float]]:
 
 
 def test_a_file_of_5_gigabytes_is_refused_unread(tmp_path: Path) -> None:
-    """By its size; a file of unknown ending by its first bytes."""
+    """A large file is refused by its size, one of unknown suffix by its first bytes."""
     paths = [tmp_path / f"w{end}" for end in (".txt", ".json", ".map", ".scen", ".yaml", ".pgm")]
     for path in (*paths, tmp_path / "w"):
         with path.open("wb") as file:
@@ -99,7 +99,7 @@ def test_a_file_of_5_gigabytes_is_refused_unread(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [100_000_000, 60_000_000])
 def test_endless_lines(size: int, tmp_path: Path) -> None:
-    """A line of 100 MB is refused by its size; one that fits is refused before it is split."""
+    """A line of 100 MB is refused by its size, a shorter one before it is split."""
     begin = {
         "blocks.txt": "boundary ", "w.map": GRID[:-4], "w.scen": SCENARIOS,
         "circles.txt": CIRCLES, "w.yaml": "image: ",
@@ -114,7 +114,7 @@ def test_endless_lines(size: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/urandom"])
 def test_endless_files(device: str, tmp_path: Path) -> None:
-    """What never ends is read up to the limit, whatever it is called."""
+    """An endless device is read up to the limit."""
     for name in ("w.map", "w.txt", "w.json", "w.scen", "w.yaml", "w.png", "w"):
         (tmp_path / name).symlink_to(device)
     message, used, _ = watched(tmp_path / "w.map")[0]
@@ -136,7 +136,7 @@ BOMBS = {
 
 
 def test_nesting_bombs(tmp_path: Path) -> None:
-    """Lists in lists in lists."""
+    """Deeply nested lists are refused."""
     for name, content in BOMBS.items():
         (tmp_path / name).write_text(content)
     for name, (message, used, seconds) in zip(
@@ -148,7 +148,7 @@ def test_nesting_bombs(tmp_path: Path) -> None:
 
 
 def test_too_much_of_everything(tmp_path: Path) -> None:
-    """Within 64 MB there is room for millions of lists and lines."""
+    """Millions of lists or lines are refused in bounded memory."""
     head = '{"schema": "brrt.world", "version": 1, "lower": [0, 0], "upper": [1, 1], '
     files = {
         "lists.json": head + '"boxes": [' + "[]," * 20_000_000 + "[]]}",
@@ -165,7 +165,7 @@ def test_too_much_of_everything(tmp_path: Path) -> None:
 
 
 def test_collections_in_collections(tmp_path: Path) -> None:
-    """What JSON can nest is still too deep for a map."""
+    """Collections nested more deeply than a map needs are refused."""
     inner: object = {"type": "GeometryCollection", "geometries": []}
     for _ in range(50):
         inner = {"type": "GeometryCollection", "geometries": [inner]}
@@ -182,7 +182,7 @@ MERGES = "a0: &a0 {x: 1}\n" + "".join(
 
 
 def test_a_billion_laughs_are_none(folder: Path) -> None:
-    """Aliases stay references: nothing is multiplied."""
+    """YAML aliases are not expanded."""
     for name, bomb in (("aliases", LAUGHS), ("merges", MERGES)):
         (folder / f"{name}.yaml").write_text(bomb + YAML)
     for message, used, seconds in watched(folder / "aliases.yaml", folder / "merges.yaml"):
@@ -194,7 +194,7 @@ def test_a_billion_laughs_are_none(folder: Path) -> None:
 
 
 def test_the_command_line_says_it_in_one_line(folder: Path, brrt: Callable[..., Result]) -> None:
-    """Bad input ends with 2 and one line that names the file."""
+    """Bad input gives exit code 2 and one line that names the file."""
     (folder / "grid.map").write_text(GRID.replace("height 2", "height 3"))
     for spec in ("grid.map", "grid.scen#1", "grid.scen#99", "none.yaml", "map.yaml:occupied=101"):
         done = brrt("plan", "--world", folder / spec)

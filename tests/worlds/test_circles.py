@@ -10,7 +10,7 @@ from tests.support.world_files import CIRCLES, QUERIES, REAL, refused
 
 
 def test_circles(tmp_path: Path) -> None:
-    """Bounds are those of the circles, and a margin if there is to be one."""
+    """The bounds are those of the circles plus the margin."""
     path = tmp_path / "c.txt"
     path.write_text(CIRCLES.replace("\n", "\r\n"))
     world = load_world(path)
@@ -21,7 +21,7 @@ def test_circles(tmp_path: Path) -> None:
 
 
 def test_queries(tmp_path: Path) -> None:
-    """By their numbers; their circles beside them, or where the user says."""
+    """Queries are chosen by number; their circles are in the same folder or where the user says."""
     (tmp_path / "circle_obstacles.txt").write_text(CIRCLES)
     (tmp_path / "other.txt").write_text("units: meter\nx y r\n1 0 0 9\n")
     path = tmp_path / "circle_queries.txt"
@@ -63,7 +63,7 @@ def test_queries(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_circles(line: str, message: str, tmp_path: Path) -> None:
-    """One line with file and line."""
+    """The error is one line with file and line number."""
     path = tmp_path / "c.txt"
     path.write_text(f"{CIRCLES}{line}\n")
     assert refused(lambda: load_world(path)).startswith(f"{path}:5: {message}")
@@ -87,7 +87,7 @@ def test_wrong_circles(line: str, message: str, tmp_path: Path) -> None:
     ],
 )
 def test_wrong_queries(line: str, message: str, tmp_path: Path) -> None:
-    """One line with file and line."""
+    """The error is one line with file and line number."""
     (tmp_path / "obstacles.txt").write_text(CIRCLES)
     path = tmp_path / "queries.txt"
     path.write_text(f"{QUERIES}{line}\n")
@@ -97,7 +97,7 @@ def test_wrong_queries(line: str, message: str, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not REAL.exists(), reason="no real worlds here")
 def test_real_queries() -> None:
-    """All 100 queries lie within the bounds and touch no circle."""
+    """All 100 queries are within the bounds and touch no circle."""
     for i in range(100):
         world = make_world(f"{REAL}/ompl_circles/circle_queries.txt#{i}")
         assert world.balls.shape == (70, 3)
@@ -108,7 +108,7 @@ def test_real_queries() -> None:
 
 
 def test_blocks_outside_are_named(tmp_path: Path) -> None:
-    """They are obstacles all the same, partly or wholly outside; ten are named, others counted."""
+    """Blocks outside the boundary are obstacles too; ten have notes, the others are counted."""
     path = tmp_path / "b.txt"
     path.write_text(
         "boundary 0 0 0 9 9 9\n# walls\nblock 1 1 1 9 9 9\nblock 8 1 1 9.5 2 2\n\n"
@@ -127,7 +127,7 @@ def test_blocks_outside_are_named(tmp_path: Path) -> None:
 
 
 def test_rows_alone_are_circles(tmp_path: Path) -> None:
-    """As one writes them by hand, without a unit or a header."""
+    """Unit and header are optional."""
     path = tmp_path / "hand.txt"
     path.write_text("1 5 5 1\n2 10 -1e1 2.5\n")
     assert load_world(path).balls.tolist() == [[5, 5, 1], [10, -10, 2.5]]

@@ -1,4 +1,4 @@
-"""The seven course maps, driven by LRTA* and by RRT; skipped where they are not at hand."""
+"""The seven course maps, planned by LRTA* and RRT; skipped if they are missing."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(not NAMES, reason="no course maps here")
 
 
 def driven(name: str, planner: str) -> tuple[Run, Memory, dict[str, object]]:
-    """Plan and drive a course as the published run of it did."""
+    """Plan and execute a course map as the published run did."""
     start, goal = json.loads(QUERIES.read_text())["queries"][name]
     classic = {"epsilon": CELL, "diagonals": False, "lookahead": 1}
     run, memory = Run(
@@ -32,7 +32,7 @@ def driven(name: str, planner: str) -> tuple[Run, Memory, dict[str, object]]:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("planner", ["lrta-star", "rrt"])
 def test_course(planner: str, name: str) -> None:
-    """Solved in time; moves of at most 1 lead from start to goal; nothing that is checked fails."""
+    """Solved in time, by moves of at most 1 from start to goal; verification passes."""
     run, memory, figures = driven(name, planner)
     events = memory.events()
     assert figures["solved"]
@@ -47,7 +47,7 @@ def test_course(planner: str, name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_lrta_star_goes_cell_by_cell(name: str) -> None:
-    """Its path is 0.5 a move, and a last hop to the goal; one of them is known exactly."""
+    """LRTA* moves 0.5 each time, then once to the goal; one path length is known exactly."""
     _, _, figures = driven(name, "lrta-star")
     path = np.array(figures["path"])
     hop = float(np.linalg.norm(path[-1] - path[-2]))

@@ -1,4 +1,4 @@
-"""What is free, what hangs together: against slow twins that look at everything."""
+"""Occupied points, free share and connectivity, against slow and obvious implementations."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -26,17 +26,17 @@ seeds = st.integers(0, 2**32)
 
 
 def halves(rng: np.random.Generator, low: float, high: float, shape: tuple[int, ...]) -> Floats:
-    """Multiples of one half: what touches does so exactly."""
+    """Draw multiples of one half, so that contacts are exact."""
     return rng.integers(round(2 * low), round(2 * high), shape, endpoint=True) / 2
 
 
 def made(name: str, upper: Sequence[float], **obstacles: Any) -> World:
-    """A world from 0 to `upper`, made by hand."""
+    """Make a world from 0 to `upper`."""
     return World(name, np.zeros(len(upper)), np.array(upper, float), **obstacles)
 
 
 def some_world(seed: int, dim: int, *, most: int = 6, exactly: bool = True) -> World:
-    """Obstacles of every kind in and around a box from 0 to 10; some have no size."""
+    """Draw obstacles of every kind in and around a box from 0 to 10; some have no size."""
     rng = np.random.default_rng(seed)
     draw = halves if exactly else (lambda rng, low, high, shape: rng.uniform(low, high, shape))
     count = rng.integers(0, most + 1, 3)
@@ -84,7 +84,7 @@ def cell_touched(world: World, low: Floats, high: Floats, margin: float) -> bool
 
 
 def flooded(free: NDArray[np.bool_], start: tuple[int, ...]) -> set[tuple[int, ...]]:
-    """The cells that a walk through faces reaches."""
+    """Return the cells that a walk through faces reaches."""
     seen, ahead = {start}, [start]
     while ahead:
         cell = ahead.pop()
@@ -106,7 +106,7 @@ def flooded(free: NDArray[np.bool_], start: tuple[int, ...]) -> set[tuple[int, .
 def test_points_are_covered_as_arithmetic_has_it(
     dim: int, seed: int, count: int, exactly: bool
 ) -> None:
-    """Every kind of obstacle, on its edge too; points outside the bounds as well."""
+    """Points inside, on the edge of and outside every kind of obstacle, also outside the bounds."""
     world = some_world(seed, dim, exactly=exactly)
     points = halves(np.random.default_rng(seed + 1), -2, 12, (count, dim))
     assert occupied(world, points).tolist() == [touches(world, point) for point in points]
@@ -123,7 +123,7 @@ def test_points_are_covered_as_arithmetic_has_it(
     ],
 )
 def test_many_obstacles_cover_what_each_of_them_covers(spec: str) -> None:
-    """Cells and batches leave nothing out."""
+    """Many obstacles and points give the same as single tests."""
     world = make_world(spec)
     points = np.random.default_rng(5).uniform(world.lower, world.upper, (1000, world.dim))
     expected = [world.obstacle_at(point) is not None for point in points]
@@ -134,7 +134,7 @@ def test_many_obstacles_cover_what_each_of_them_covers(spec: str) -> None:
 @DIMS
 @pytest.mark.parametrize("scale", [1e-90, 1e-3, 1e12, 1e90])
 def test_points_are_covered_at_every_scale(dim: int, scale: float) -> None:
-    """A world and its points may be grown or shrunk."""
+    """Scaling a world and its points changes nothing."""
     world = some_world(11, dim, most=20, exactly=False)
     points = np.random.default_rng(1).uniform(-1, 11, (500, dim))
     grown = World(
@@ -159,7 +159,7 @@ def test_points_are_covered_at_every_scale(dim: int, scale: float) -> None:
     ids=lambda value: value.name if isinstance(value, World) else "",
 )
 def test_the_standard_error_is_honest(world: World, share: float) -> None:
-    """Over many seeds the true share is as far away as the error says, or nearer."""
+    """Over many seeds the deviation from the true share agrees with the standard error."""
     found = np.array([free_fraction(world, seed) for seed in range(60)])
     off = (found[:, 0] - share) / found[:, 1]
     assert np.abs(off).max() < 4.5
@@ -169,12 +169,12 @@ def test_the_standard_error_is_honest(world: World, share: float) -> None:
 
 
 def test_an_empty_world_is_free_for_certain() -> None:
-    """There is nothing to measure, and nothing to miss."""
+    """The share is exact and the error 0."""
     assert free_fraction(made("empty", [3, 7])) == (1.0, 0.0)
 
 
 def test_the_share_depends_on_the_seed_alone() -> None:
-    """Again the same; with another seed another."""
+    """Equal seeds give equal points, other seeds others."""
     world = make_world("circles2d")
     assert free_fraction(world, 3) == free_fraction(world, 3) != free_fraction(world, 4)
 
@@ -187,7 +187,7 @@ def test_the_share_depends_on_the_seed_alone() -> None:
     st.integers(1, 5000),
 )
 def test_a_lattice_fills_its_box(size: list[float], cells: int) -> None:
-    """About as many cells as asked for, and nearly cubes unless one is wider than the box."""
+    """A raster has about the requested number of cells, nearly cubes unless the box is thin."""
     upper = np.array(size)
     lattice = Raster.over(np.zeros(len(size)), upper, cells)
     shape = np.array(lattice.shape)
@@ -202,7 +202,7 @@ def test_a_lattice_fills_its_box(size: list[float], cells: int) -> None:
 @settings(max_examples=60)
 @given(seeds, st.booleans(), st.integers(1, 80))
 def test_blocked_cells_are_the_touched_ones(dim: int, seed: int, exactly: bool, cells: int) -> None:
-    """A cell that an obstacle touches is blocked, and no other, but for rounding."""
+    """Exactly the cells that an obstacle touches are blocked, up to rounding."""
     world = some_world(seed, dim, most=3, exactly=exactly)
     lattice = Raster.over(world.lower, world.upper, cells)
     blocked = lattice.blocked(obstacle_arrays(world))
@@ -218,7 +218,7 @@ def test_blocked_cells_are_the_touched_ones(dim: int, seed: int, exactly: bool, 
 @settings(max_examples=80)
 @given(seeds, st.lists(st.integers(1, 9), min_size=2, max_size=3), st.floats(0, 1))
 def test_components_are_those_of_a_walk(seed: int, shape: list[int], density: float) -> None:
-    """Cells have equal numbers just where a walk leads from one to the other."""
+    """Two cells have equal labels if and only if a walk connects them."""
     free = np.random.default_rng(seed).random(shape) >= density
     labels = components(free)
     assert ((labels == -1) == ~free).all()
@@ -229,7 +229,7 @@ def test_components_are_those_of_a_walk(seed: int, shape: list[int], density: fl
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_long_way_takes_no_longer(turned: bool) -> None:
-    """A serpentine of half a million cells is one component, and one more wall makes two."""
+    """A serpentine of half a million cells is one component; one more wall makes two."""
     free = np.ones((1024, 1024), bool)
     free[1::4, :-1] = False
     free[3::4, 1:] = False
@@ -243,7 +243,7 @@ def test_a_long_way_takes_no_longer(turned: bool) -> None:
 
 
 def of_cells(blocked: NDArray[np.bool_], start: Sequence[int], goal: Sequence[int]) -> World:
-    """A world of unit boxes, start and goal in the middle of cells."""
+    """Make a world of unit boxes, with start and goal in the middle of cells."""
     low = np.argwhere(blocked).astype(float)
     boxes = np.concatenate([low, low + 1], axis=1)
     ends = [np.array(cell) + 0.5 for cell in (start, goal)]
@@ -254,7 +254,7 @@ def of_cells(blocked: NDArray[np.bool_], start: Sequence[int], goal: Sequence[in
 @settings(max_examples=60)
 @given(seeds, st.lists(st.integers(1, 7), min_size=2, max_size=3))
 def test_a_way_is_found_where_there_is_one(seed: int, shape: list[int]) -> None:
-    """Corridors that are wide enough for the cells; touching corners close a way."""
+    """Corridors wider than the cells connect; boxes that touch at corners do not let through."""
     rng = np.random.default_rng(seed)
     blocked = rng.random(shape) < 0.4
     start, goal = (tuple(rng.integers(0, shape).tolist()) for _ in range(2))
@@ -272,7 +272,7 @@ def test_a_way_is_found_where_there_is_one(seed: int, shape: list[int]) -> None:
 @settings(max_examples=40)
 @given(seeds, st.integers(3, 9), st.booleans())
 def test_no_way_leads_through_a_thin_ring(seed: int, corners: int, pierced: bool) -> None:
-    """Line segments around the start; with one of them left out there is a way."""
+    """Line segments enclose the start; without one of them there is a path."""
     rng = np.random.default_rng(seed)
     angles = 2 * np.pi * (np.arange(corners) + rng.uniform(-0.2, 0.2, corners)) / corners
     ring = 5 + 3 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -288,7 +288,7 @@ def test_no_way_leads_through_a_thin_ring(seed: int, corners: int, pierced: bool
 @settings(max_examples=30)
 @given(seeds)
 def test_a_way_that_is_found_stays_among_free_points(dim: int, seed: int) -> None:
-    """A dense walk over points contradicts none of the ways that are said to be there."""
+    """A walk over a dense grid of points confirms every connection."""
     world = some_world(seed, dim, most=12 if dim == 2 else 40)
     if dim == 3:  # between boxes no way is narrower than half a unit
         world = replace(world, balls=np.empty((0, 4)))
@@ -306,7 +306,7 @@ def test_a_way_that_is_found_stays_among_free_points(dim: int, seed: int) -> Non
 
 
 def _finer(world: World, start: Floats, goal: Floats) -> bool:
-    """The same walk over many more points, where a narrow way may show."""
+    """Whether a walk over many more points connects two points, for narrow places."""
     steps = (1201, 1201) if world.dim == 2 else (121,) * 3
     axes = [np.linspace(0, 10, n) for n in steps]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, world.dim)
@@ -318,7 +318,7 @@ def _finer(world: World, start: Floats, goal: Floats) -> bool:
 @settings(max_examples=80)
 @given(seeds, st.integers(1, 8), st.integers(1, 8), st.sampled_from([0.0, 0.5, 2.0]))
 def test_a_map_is_decided_on_its_own_cells(seed: int, rows: int, columns: int, yaw: float) -> None:
-    """Both answers are certain, on the border of two cells too; a lattice never contradicts."""
+    """Grid maps are decided exactly, also at the border of cells; rasters never contradict."""
     rng = np.random.default_rng(seed)
     cells = rng.random((rows, columns)) < 0.4
     grid = Grid(cells, np.array([3.0, -2]), 0.5, yaw)
@@ -336,7 +336,7 @@ def test_a_map_is_decided_on_its_own_cells(seed: int, rows: int, columns: int, y
 
 
 def test_a_map_with_a_wall_is_searched_as_a_world() -> None:
-    """The grid's own cells are not all there is."""
+    """A grid with other obstacles is searched by rasters."""
     world = World.of_grid("map", Grid(np.zeros((4, 4), bool), np.zeros(2), 1.0))
     ends = np.array([0.5, 0.5]), np.array([3.5, 3.5])
     assert connected(world, *ends).connected is True
@@ -346,7 +346,7 @@ def test_a_map_with_a_wall_is_searched_as_a_world() -> None:
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9])
 def test_a_start_close_to_an_obstacle_is_led_away(gap: float) -> None:
-    """Its cell is blocked, and a straight motion out of it is free."""
+    """A start in a blocked cell connects by a free straight motion."""
     box = made("box", [10, 10], boxes=[[2, 2, 8, 8]])
     ball = made("ball", [10] * 3, balls=[[5, 5, 5, 3]])
     for world, start, goal in ((box, [2 - gap, 5], [8 + gap, 5]), (ball, [2 - gap, 5, 5], [9] * 3)):
@@ -354,7 +354,7 @@ def test_a_start_close_to_an_obstacle_is_led_away(gap: float) -> None:
 
 
 def test_a_start_in_a_hole_too_small_for_a_cell_is_not_led_out() -> None:
-    """Walls on all sides, nearer than the finest cell is wide."""
+    """Walls closer than a cell leave the answer open."""
     walls = [[4, 4, 6, 4.9999], [4, 5.0001, 6, 6], [4, 4, 4.9999, 6], [5.0001, 4, 6, 6]]
     world = made("hole", [10, 10], boxes=walls)
     found = connected(world, np.array([5.0, 5]), np.array([9.0, 9]))
@@ -373,7 +373,7 @@ def test_a_start_in_a_hole_too_small_for_a_cell_is_not_led_out() -> None:
 def test_ends_that_are_of_no_use_are_named(
     start: list[float], goal: list[float], words: str
 ) -> None:
-    """That there is no way is then certain."""
+    """An end in an obstacle proves that there is no path."""
     world = made("ball", [10, 10], balls=[[5, 5, 2]])
     found = connected(world, np.array(start, float), np.array(goal, float))
     assert found.connected is False

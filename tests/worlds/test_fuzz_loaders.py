@@ -1,4 +1,4 @@
-"""Whatever is done to a world file, it is read or refused in one line."""
+"""A corrupted world file is read, or refused in one line."""
 
 from pathlib import Path
 from random import Random
@@ -16,7 +16,7 @@ from tests.support.world_files import GOOD, corrupted, write
 @settings(max_examples=150)
 @given(rng=st.randoms(use_true_random=False))
 def test_corrupted_files(name: str, rng: Random, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Bytes, words and lines changed, taken away or put in, in files of every format."""
+    """Bytes, words and lines are changed, removed or inserted in files of every format."""
     folder = tmp_path_factory.getbasetemp() / "corrupted"
     if not folder.exists():
         folder.mkdir()

@@ -1,4 +1,4 @@
-"""Generators: what every world promises, what is special to each, and what they refuse."""
+"""Generators: common properties of all worlds, each generator's own, and errors."""
 
 import hashlib
 import re
@@ -30,13 +30,13 @@ SEEDED = pytest.mark.parametrize(
     "name", [name for name, kind in GENERATORS.items() if issubclass(kind, Seeded)]
 )
 CELLS = {2: 400, 3: 80}
-"""Cells along a map's longest side that show a way through every default world."""
+"""Cells along a map's longest side that show a path through every default world."""
 ULPS = 1e-12
-"""Sums of coordinates may round by this part of the map."""
+"""Relative rounding error of sums of coordinates."""
 
 
 def corners(world: World) -> tuple[Floats, Floats]:
-    """Least and greatest corner of each obstacle."""
+    """Return the least and the greatest corner of each obstacle."""
     d, balls, boxes = world.dim, world.balls, world.boxes
     least, most = [balls[:, :d] - balls[:, d:], boxes[:, :d]], [balls[:, :d] + balls[:, d:]]
     most.append(boxes[:, d:])
@@ -50,7 +50,7 @@ def corners(world: World) -> tuple[Floats, Floats]:
 
 
 def occupied(world: World, points: Floats) -> NDArray[np.bool_]:
-    """Whether an obstacle touches each point, shape (n, d): obstacle by obstacle."""
+    """Whether an obstacle touches each point, shape (n, d), tested one obstacle at a time."""
     d, found = world.dim, np.zeros(len(points), np.bool_)
     for ball in world.balls:
         found |= np.linalg.norm(points - ball[:d], axis=1) <= ball[d]
@@ -65,7 +65,7 @@ def occupied(world: World, points: Floats) -> NDArray[np.bool_]:
 
 
 def way(world: World, cells: int) -> bool:
-    """Whether free cells that share sides lead from start to goal.
+    """Whether a path of free cells that share sides leads from start to goal.
 
     A cell is called free when its middle is further from every obstacle than its corners are from
     its middle.
@@ -97,12 +97,12 @@ def way(world: World, cells: int) -> bool:
 
 
 def world_dim(name: str) -> int:
-    """2 or 3, as the name says."""
+    """Return 2 or 3, from the name."""
     return 3 if name.endswith("3d") else 2
 
 
 def apart(world: World, number: int, points: Floats) -> Floats:
-    """Distance of points from an obstacle, counted as in `corners`; no more than that, at least."""
+    """Return a lower bound of points' distance from an obstacle, numbered as in `corners`."""
     d, balls, boxes = world.dim, len(world.balls), len(world.boxes)
     if number < balls:
         ball = world.balls[number]
@@ -120,13 +120,13 @@ def apart(world: World, number: int, points: Floats) -> Floats:
 
 @EVERY
 def test_a_point_can_solve_every_default_world(name: str) -> None:
-    """A way of free cells leads from start to goal."""
+    """A path of free cells leads from start to goal."""
     assert way(make_world(name), CELLS[world_dim(name)])
 
 
 @EVERY
 def test_seeded_or_without_a_seed(name: str) -> None:
-    """The same specification gives the same world; another seed another; fixed ones have none."""
+    """Equal specifications give equal worlds, other seeds others; fixed worlds have no seed."""
     world = make_world(name)
     assert world.name == name
     assert_same(world, make_world(name))
@@ -141,7 +141,7 @@ def test_seeded_or_without_a_seed(name: str) -> None:
 
 @st.composite
 def parameters(draw: st.DrawFn, name: str) -> dict[str, object]:
-    """Parameters from their declared ranges, lengths in proportion to the map; some left out."""
+    """Draw some parameters from their ranges, lengths in proportion to the map."""
     # A density of obstacles that are tiny on their map would take millions of them.
     scattered = issubclass(GENERATORS[name], Scattered)
     size = draw(st.sampled_from([100.0, 60.0, 1.0] + [1e-6, 12345.6] * (not scattered)))
@@ -195,7 +195,7 @@ def test_any_parameters_make_a_world_or_one_line(
 @settings(max_examples=10, deadline=None)
 @given(st.data())
 def test_a_world_grows_with_its_size(name: str, data: st.DataObject) -> None:
-    """Lengths that are not given are in proportion to the map."""
+    """Default lengths are in proportion to the map."""
     if name in (*BALLS, *BOXES, *POLYGONS):
         return
     size = data.draw(st.floats(1e-3, 1e6))
@@ -206,7 +206,7 @@ def test_a_world_grows_with_its_size(name: str, data: st.DataObject) -> None:
 
 @EVERY
 def test_given_ends_are_kept(name: str) -> None:
-    """The query is the user's, also in a wall: that is for the query to refuse."""
+    """Given ends are kept even in a wall: the query refuses them later."""
     dim = world_dim(name)
     start, goal = np.full(dim, 23.4), np.full(dim, 12.3)
     world = make_world(name, start, goal)
@@ -218,7 +218,7 @@ def test_given_ends_are_kept(name: str) -> None:
 
 @SEEDED
 def test_seeds_of_any_length(name: str) -> None:
-    """A seed has no greatest value, and the last digit counts."""
+    """Seeds have no maximum, and all digits count."""
     one, other = (make_world(f"{name}:seed={10**40 + i}") for i in range(2))
     assert (
         one.boxes.tobytes() + one.balls.tobytes() != other.boxes.tobytes() + other.balls.tobytes()
@@ -233,7 +233,7 @@ def test_seeds_of_any_length(name: str) -> None:
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 300), st.integers(0, 2**70), st.sampled_from([1.0, 33.3, 100.0, 1e6, 1e-3]))
 def test_obstacles_are_as_asked(name: str, n: int, seed: int, size: float) -> None:
-    """As many as asked for, within the map, sizes in range, start and goal free."""
+    """The requested number, within the map, with sizes in range; start and goal are free."""
     world = make_world(f"{name}:n={n},seed={seed},size={size!r},{sizes(name, size)}")
     d = world.dim
     assert d == world_dim(name)
@@ -263,7 +263,7 @@ def test_obstacles_are_as_asked(name: str, n: int, seed: int, size: float) -> No
 
 
 def sizes(name: str, size: float) -> str:
-    """Sizes of obstacles in proportion to the map, as parameters."""
+    """Return sizes of obstacles in proportion to the map, as parameters."""
     if name not in BOXES:
         return f"min_radius={0.01 * size!r},max_radius={0.08 * size!r}"
     return f"min_side={0.02 * size!r},max_side={0.15 * size!r}"
@@ -271,7 +271,7 @@ def sizes(name: str, size: float) -> str:
 
 @SCATTERED
 def test_seeded(name: str) -> None:
-    """The same seed gives the same world, another seed another one."""
+    """Equal seeds give equal worlds, other seeds others."""
     one = make_world(f"{name}:n=20,seed=7")
     assert_same(one, make_world(f"{name}:seed=7,n=20"))
     assert_same(make_world(name), make_world(f"{name}:seed=0"))
@@ -283,7 +283,7 @@ def test_seeded(name: str) -> None:
 @settings(max_examples=25, deadline=None)
 @given(st.data())
 def test_given_ends_are_never_covered(name: str, data: st.DataObject) -> None:
-    """Obstacles keep off start and goal wherever a user wants them, walls and corners included."""
+    """Obstacles keep away from any given start and goal, also at walls and in corners."""
     dim = world_dim(name)
     end = st.lists(st.floats(0, 100), min_size=dim, max_size=dim).map(np.array)
     start, goal = data.draw(end), data.draw(end)
@@ -297,7 +297,7 @@ def test_given_ends_are_never_covered(name: str, data: st.DataObject) -> None:
 
 @SCATTERED
 def test_obstacles_are_spread_over_the_map(name: str) -> None:
-    """Centres lie in every quarter of every axis, in numbers that are not far apart."""
+    """Centres are distributed uniformly over quarters of every axis."""
     least, most = corners(make_world(f"{name}:n=4000"))
     centres = (least + most) / 2
     for axis in range(centres.shape[1]):
@@ -308,7 +308,7 @@ def test_obstacles_are_spread_over_the_map(name: str) -> None:
 
 @SCATTERED
 def test_only_one_end_given(name: str) -> None:
-    """The other end stays in its corner."""
+    """If one end is given, the other stays in its corner."""
     dim = world_dim(name)
     world = make_world(name, np.full(dim, 50.0))
     assert world.start is not None
@@ -381,7 +381,7 @@ def test_only_one_end_given(name: str) -> None:
     ],
 )
 def test_wrong_specifications(spec: str, message: str) -> None:
-    """Each error names what is wrong, the value, and where there is one the nearest name."""
+    """Each error names the parameter, the value, and the nearest name if there is one."""
     assert message in refused(lambda: make_world(spec))
 
 
@@ -389,14 +389,14 @@ def test_wrong_specifications(spec: str, message: str) -> None:
     "spec", ["circles2d:n=1,min_radius=50,max_radius=50", "squares2d:n=5,min_side=99,max_side=100"]
 )
 def test_no_room_for_start_and_goal(spec: str) -> None:
-    """Obstacles that cannot but cover start or goal are an error, not a loop without end."""
+    """Obstacles that always cover start or goal are an error, not an endless loop."""
     start = np.full(2, 50.0)
     assert "leave no room for start and goal" in refused(lambda: make_world(spec, start))
 
 
 @SCATTERED
 def test_spaces_and_empty_parts_do_not_matter(name: str) -> None:
-    """Parameters may be set apart by spaces, and a comma too many does no harm."""
+    """Spaces around parameters and extra commas are ignored."""
     assert_same(make_world(f"{name}: n = 5 ,, seed=1,"), make_world(f"{name}:n=5,seed=1"))
 
 
@@ -411,7 +411,7 @@ DIGESTS = {
 
 @pytest.mark.parametrize("spec", DIGESTS)
 def test_worlds_stay_what_they_were(spec: str) -> None:
-    """Recordings name their world by its specification: it must go on to mean the same."""
+    """Recordings name their world by its specification, so that its meaning must not change."""
     world = make_world(spec, None, np.full(world_dim(spec.partition(":")[0]), 20.0), room=1.5)
     data = world.balls.tobytes() + world.boxes.tobytes()
     assert hashlib.sha256(data).hexdigest()[:16] == DIGESTS[spec]
@@ -420,7 +420,7 @@ def test_worlds_stay_what_they_were(spec: str) -> None:
 @SCATTERED
 @pytest.mark.parametrize("density", [0.03, 0.3, 0.6])
 def test_density(name: str, density: float) -> None:
-    """As many obstacles as it takes and not one more cover the share, and the note says so."""
+    """The least number of obstacles covers the share, and the note states both."""
     points = np.random.default_rng(5).random((5000, world_dim(name))) * 100
     world = make_world(f"{name}:density={density},seed=4")
     (note,) = world.notes
@@ -439,7 +439,7 @@ def test_density(name: str, density: float) -> None:
 
 @SCATTERED
 def test_a_denser_world_holds_the_sparser_one(name: str) -> None:
-    """The sequence of obstacles depends on the seed alone; nothing is asked for, nothing comes."""
+    """The sequence of obstacles depends only on the seed; density 0 gives none."""
     worlds = [make_world(f"{name}:density={density}") for density in (0, 0.1, 0.3, 0.6)]
     assert len(corners(worlds[0])[0]) == 0
     for less, more in pairwise(worlds):
@@ -449,7 +449,7 @@ def test_a_denser_world_holds_the_sparser_one(name: str) -> None:
 
 
 def test_tiny_obstacles_may_be_many() -> None:
-    """Their cost is by the point that they cover, and the share is what was asked for."""
+    """Many small obstacles reach the requested share in bounded time."""
     world = make_world("circles2d:density=0.05,min_radius=0.1,max_radius=0.1")
     # Few overlap: 1 - exp(-x) of the map is covered where their areas sum up to x.
     assert abs(len(world.balls) - -np.log(0.95) / (np.pi * 1e-6)) < 1000
@@ -457,14 +457,14 @@ def test_tiny_obstacles_may_be_many() -> None:
 
 @pytest.mark.parametrize("spec", ["density=0.995", "density=1", "density=0.99,max_radius=30"])
 def test_a_density_out_of_reach(spec: str) -> None:
-    """Corners and the places around start and goal stay free, so that some shares are too much."""
+    """Corners and the surroundings of start and goal stay free, so that some densities fail."""
     why = refused(lambda: make_world(f"circles2d:min_radius=2,{spec}"))
     assert "cannot be reached" in why
     assert "obstacles cover only 0.9" in why
 
 
 def test_a_density_of_specks() -> None:
-    """Obstacles that are too small are refused at once, and not after ten million of them."""
+    """Obstacles that are too small are refused at once, not after ten million draws."""
     why = refused(lambda: make_world("spheres3d:density=0.2,min_radius=0.1,max_radius=0.1"))
     assert "density 0.2 would take more than 10,000,000 obstacles of this size; ask for" in why
 
@@ -473,7 +473,7 @@ def test_a_density_of_specks() -> None:
 
 
 def trunks(world: World) -> tuple[Floats, float]:
-    """Middles of the trunks and their radius."""
+    """Return the middles of the trunks and their radius."""
     if world.dim == 2:
         return world.balls[:, :2], float(world.balls[0, 2])
     sides = world.boxes[:, 3:5] - world.boxes[:, :2]
@@ -487,7 +487,7 @@ def trunks(world: World) -> tuple[Floats, float]:
 def test_trees_keep_their_distance(
     name: str, radius: float, gap: float, seed: int, room: float
 ) -> None:
-    """From each other, from the ends, from the border, and hardly another one fits."""
+    """Trees keep their distance from each other, the ends and the border, and fill the map."""
     gap = max(gap, 0.03 - radius)
     size = 60.0
     radius, gap, room = radius * size, gap * size, room * size
@@ -510,7 +510,7 @@ def test_trees_keep_their_distance(
 
 
 def test_heights_of_trees() -> None:
-    """They stand on the floor and are as high as asked for."""
+    """Trees start at the floor and have the requested heights."""
     boxes = make_world("forest3d:min_height=0.2,max_height=0.4,size=50").boxes
     assert (boxes[:, 2] == 0).all()
     assert 10 <= boxes[:, 5].min() < 12
@@ -522,12 +522,12 @@ def test_heights_of_trees() -> None:
 
 @EVERY
 def test_a_world_that_is_connected_stays_as_it_is(name: str) -> None:
-    """A way is looked for before anything is drawn anew."""
+    """Connected worlds are not drawn again."""
     assert_same(make_world(name), make_world(f"{name}:connected=true"))
 
 
 def test_connected_on_request() -> None:
-    """Worlds without a way are drawn anew until there is one, the same ones each time."""
+    """Worlds without a path are drawn again until there is one, reproducibly."""
     start, goal = np.full(2, 35.0), np.full(2, 70.0)
     redrawn = 0
     for seed in range(3):
@@ -552,7 +552,7 @@ def test_connected_on_request() -> None:
     ],
 )
 def test_no_way(spec: str, start: list[float], message: str) -> None:
-    """The error says what it rests on, and what may help."""
+    """The error gives the reason and a remedy."""
     spec += ":connected=true" if ":" not in spec else ",connected=true"
     why = refused(lambda: make_world(spec, np.array(start, np.float64)))
     assert f"world {spec}: no path from start to goal was found {message}" in why
@@ -563,7 +563,7 @@ def test_no_way(spec: str, start: list[float], message: str) -> None:
 
 @given(st.data(), st.sampled_from([2, 3]))
 def test_a_box_without_a_hole(data: st.DataObject, dim: int) -> None:
-    """Every unit cell of the box is in one of the boxes, but for those of the hole."""
+    """Every unit cell of the box except the hole is in exactly one of the boxes."""
     cells = np.zeros((5,) * dim, np.int64)
     low, high = np.sort(data.draw(arrays(int, (2, dim), elements=st.integers(-3, 8))), axis=0)
     for box in subtract_box(np.zeros(dim), np.full(dim, 5), [low, high]).astype(int):
@@ -576,7 +576,7 @@ def test_a_box_without_a_hole(data: st.DataObject, dim: int) -> None:
 
 @given(st.integers(1, 3), st.integers(1, 6), st.integers(0, 2**32), st.sampled_from([0.3, 0.8, 1]))
 def test_merged_boxes_are_the_blocked_cells(dim: int, n: int, seed: int, part: float) -> None:
-    """Painted back, the boxes give the cells, and none is painted twice; a full lattice is one."""
+    """The boxes cover exactly the blocked cells, each once; a full grid is one box."""
     rng = np.random.default_rng(seed)
     blocked = rng.random((n,) * dim) < part
     edges = np.cumsum(rng.random(n + 1))
@@ -609,7 +609,7 @@ def test_merged_boxes_are_the_blocked_cells(dim: int, n: int, seed: int, part: f
     ],
 )
 def test_there_is_no_other_way(name: str, plug: list[float]) -> None:
-    """A plug in the opening leaves no way, where there is one without it: nothing leaks."""
+    """A plug in the opening leaves no path: the walls have no leaks."""
     world = make_world(name)
     plugged = replace(world, boxes=np.vstack([*world.boxes, plug]))
     assert not way(plugged, CELLS[world_dim(name)])
@@ -619,7 +619,7 @@ def test_there_is_no_other_way(name: str, plug: list[float]) -> None:
 
 
 def cell_graph(world: World, cells: int, side: float, wall: float) -> Pairs:
-    """Neighbours with a way between them, as flat indices, shape (n, 2)."""
+    """Return neighbours without a wall between them, as flat indices, shape (n, 2)."""
     places = np.argwhere(np.ones((cells,) * world.dim))
     middles = np.asarray(side / 2 + places * (side + wall), np.float64)
     assert not occupied(world, middles).any()
@@ -633,7 +633,7 @@ def cell_graph(world: World, cells: int, side: float, wall: float) -> Pairs:
 
 
 def reached(pairs: Pairs, cells: int) -> int:
-    """How many cells can be reached from the first."""
+    """Return how many cells can be reached from the first."""
     root = list(range(cells))
 
     def find(i: int) -> int:
@@ -650,7 +650,7 @@ def reached(pairs: Pairs, cells: int) -> int:
 @settings(max_examples=20, deadline=None)
 @given(st.integers(2, 9), st.integers(0, 999), st.floats(0.01, 0.95), st.booleans())
 def test_mazes_are_perfect(name: str, cells: int, seed: int, part: float, by_wall: bool) -> None:
-    """The ways are a tree of all cells, corridors and walls as wide as asked for."""
+    """Connections are a spanning tree; corridors and walls have the requested widths."""
     size = 60.0
     if by_wall:
         wall = part * size / (cells - 1)
@@ -672,14 +672,14 @@ def test_mazes_are_perfect(name: str, cells: int, seed: int, part: float, by_wal
 
 
 def test_a_large_maze_has_few_boxes() -> None:
-    """Of 2,401 walls that stand between 2,500 cells, those in line are one box."""
+    """Walls in line are merged into one box."""
     assert len(make_world("maze2d:cells=50").boxes) < 1600
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(1, 7), st.integers(0, 999), st.sampled_from([0, 0.5, 1]), st.floats(0.02, 0.95))
 def test_rooms_have_doors(rooms: int, seed: int, loops: float, part: float) -> None:
-    """Doors join all rooms; with loops=0 no more than it takes, with loops=1 all walls have one."""
+    """Doors connect all rooms; loops=0 gives a tree, loops=1 a door in every wall."""
     side, wall = 100 / rooms * 0.9 + 10 / rooms / rooms, 10 / rooms
     door = part * side * (1 - 1e-9)
     world = make_world(f"rooms2d:rooms={rooms},seed={seed},loops={loops},door={door!r}")
@@ -701,7 +701,7 @@ def test_rooms_have_doors(rooms: int, seed: int, loops: float, part: float) -> N
 
 @pytest.mark.parametrize("turns", [1, 2, 3, 8])
 def test_the_spiral_is_one_corridor(turns: int) -> None:
-    """Each cell but two has two neighbours, and the way ends in the middle."""
+    """The corridor is one path through all cells that ends in the middle."""
     cells = 2 * turns + 1
     wall = 10 / cells
     world = make_world(f"spiral2d:turns={turns}")

@@ -1,4 +1,4 @@
-"""GeoJSON: the convex pieces are the polygons, to the last point, and bad polygons say where."""
+"""GeoJSON: convex pieces are exactly the polygons, and errors name the place."""
 
 import json
 import sys
@@ -40,7 +40,7 @@ def of(kind: str, coordinates: Any) -> dict[str, Any]:
 
 @st.composite
 def stars(draw: st.DrawFn) -> list[np.ndarray[Any, Any]]:
-    """A polygon that turns once around a middle, with holes that do so in small cells within."""
+    """Draw a star-shaped polygon with star-shaped holes."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     count = draw(st.integers(3, 40))
     grain = draw(st.sampled_from([1e-3, 0.5, 0.0]))
@@ -63,7 +63,7 @@ def _ring(middle: Any, angles: Any, radii: Any) -> Any:
 @settings(max_examples=150)
 @given(stars())
 def test_pieces_are_the_polygon(rings: list[Any]) -> None:
-    """Convex, as large together as the polygon, no point more or less, none covered twice."""
+    """Pieces are convex, do not overlap, and cover exactly the polygon."""
     polygon = Polygon(rings[0], rings[1:])
     if not polygon.is_valid:
         assert "not a polygon that encloses an area" in refused(lambda: convex_pieces("", rings))
@@ -81,7 +81,7 @@ def test_pieces_are_the_polygon(rings: list[Any]) -> None:
 
 
 def test_triangles_are_joined() -> None:
-    """Convex polygons stay whole, an L is two pieces, a frame is few."""
+    """A convex polygon is one piece, an L two, a frame a few."""
     ring = [np.array(SQUARE, float)]
     assert [len(p) for p in convex_pieces("", ring)] == [4]
     assert [len(p) for p in convex_pieces("", [ring[0][::-1]])] == [4]
@@ -92,7 +92,7 @@ def test_triangles_are_joined() -> None:
 
 
 def test_closed_polygons_and_open_holes(tmp_path: Path) -> None:
-    """What the polygon is blocked, its border too; the inside of a hole is free, its rim not."""
+    """The polygon is blocked with its border; the inside of a hole is free, its border is not."""
     world = loaded(of("Polygon", [SQUARE, HOLE]), tmp_path)
     for x, y, hit in (
         (0.5, 0.5, True), (1.5, 1.5, False), (1, 1.5, True), (2, 2, True), (4, 2, True),
@@ -102,7 +102,7 @@ def test_closed_polygons_and_open_holes(tmp_path: Path) -> None:
 
 
 def test_all_kinds(tmp_path: Path) -> None:
-    """Collections of features and of geometries, several polygons, the query, what is left out."""
+    """Collections of features and geometries, multipolygons, the query, ignored types."""
     far = [[x + 10, y] for x, y in SQUARE]
     data = {
         "type": "FeatureCollection",
@@ -179,13 +179,13 @@ BOW = [[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]
     ],
 )  # fmt: skip
 def test_bad_geojson(data: Any, message: str, tmp_path: Path) -> None:
-    """One line with the file and the feature."""
+    """The error is one line with the file and the feature."""
     error = refused(lambda: loaded(data, tmp_path))
     assert error.startswith(f"{tmp_path / 'w.geojson'}{message}")
 
 
 def test_without_shapely(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is an extra, and its absence is one line."""
+    """Without shapely the error is one line."""
     monkeypatch.setitem(sys.modules, "shapely", None)
     monkeypatch.delitem(sys.modules, "brrt.worlds.loaders.convex_decomposition", raising=False)
     path = tmp_path / "w.geojson"

@@ -1,4 +1,4 @@
-"""World files: which loader reads what, how files are named, and what is refused in one line."""
+"""World files: choice of the loader, specifications of files, and errors."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def loader_of(path: Path) -> str:
-    """The name of the loader that is chosen for a file: that which settings are checked by."""
+    """Return the name of the loader that is chosen for a file."""
     message = refused(lambda: load_world(path, {"none of these": "1"}))
     return message.split("parameter of loader ")[1].split()[0]
 
@@ -38,7 +38,7 @@ def loader_of(path: Path) -> str:
 
 @pytest.mark.parametrize("name", GOOD)
 def test_by_ending_and_by_content_alone(name: str, folder: Path) -> None:
-    """The same file under its own ending, in capitals, a strange one or none is read the same."""
+    """The same file with its own suffix, in capitals, an unknown one or none is read equally."""
     world = load_world(folder / name)
     assert world.name == str(folder / name)
     assert loader_of(folder / name) == FORMATS[name]
@@ -64,13 +64,13 @@ def test_by_ending_and_by_content_alone(name: str, folder: Path) -> None:
 def test_endings_that_several_loaders_have(
     name: str, content: str, loader: str, tmp_path: Path
 ) -> None:
-    """The content decides; what none recognises goes to the first, whose errors are clear."""
+    """The content decides; a file that none recognises goes to the first loader."""
     (tmp_path / name).write_text(content)
     assert loader_of(tmp_path / name) == loader
 
 
 def test_many_comments_do_not_hold_up_the_choice(tmp_path: Path) -> None:
-    """A beginning that matches in many ways is looked at once."""
+    """Recognising a file takes linear time."""
     (tmp_path / "w.txt").write_text("# #" * 20_000 + "\nwall")
     assert "60,000 characters" in refused(lambda: load_world(tmp_path / "w.txt"))
 
@@ -105,7 +105,7 @@ def test_many_comments_do_not_hold_up_the_choice(tmp_path: Path) -> None:
 def test_specifications(
     spec: str, path: str, params: str, query: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What exists as a file is never taken apart; what does not is cut at `:name=` or `#`."""
+    """Names of existing files are not split; others are split at `:name=` or `#`."""
     monkeypatch.chdir(tmp_path)
     for name in ("a", "a.map", "a:1#2.map"):
         Path(name).touch()
@@ -113,7 +113,7 @@ def test_specifications(
 
 
 def test_parameters_and_queries_reach_the_loader(folder: Path) -> None:
-    """And the world is called what the user said."""
+    """Parameters and queries are passed on, and the world's name is the specification."""
     spec = f"{folder}/circle_queries.txt:margin=1#7"
     world = make_world(spec)
     assert world.name == spec
@@ -129,7 +129,7 @@ def test_parameters_and_queries_reach_the_loader(folder: Path) -> None:
 
 
 def test_worlds_beside_a_scenario(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file that a TOML names is looked for beside it first, with whatever follows its name."""
+    """A file named in a TOML is first searched in the TOML's folder."""
     toml = folder / "run.toml"
     for spec in ("map.yaml:unknown=free", "grid.scen#1", "world.json"):
         toml.write_text(f"world = {json.dumps(spec)}\n")
@@ -141,7 +141,7 @@ def test_worlds_beside_a_scenario(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_loaders_describe_themselves() -> None:
-    """What lists print: a line about it, endings, and parameters with their meaning."""
+    """Every loader has a first line, suffixes, and parameters with meanings."""
     for loader in LOADERS.values():
         assert (loader.__doc__ or "").split("\n")[0].endswith(".")
         assert loader.endings
@@ -158,7 +158,7 @@ def test_loaders_describe_themselves() -> None:
     ids=lambda p: p.name if p else "none",
 )
 def test_real_worlds(path: Path | None) -> None:
-    """Every world that others made loads, but for the one whose image is missing by intent."""
+    """Every real world loads, except the one whose image is missing on purpose."""
     if path is None:
         pytest.skip("no real worlds here")
     if path.name == "invalid_image.yaml":

@@ -1,4 +1,4 @@
-"""Maps of ROS's map_server and plain images: which pixels are blocked, and where they lie."""
+"""Maps of ROS's map_server and plain images: which pixels are blocked, and where they are."""
 
 import time
 import zlib
@@ -20,7 +20,7 @@ from tests.support.world_files import PGM, REAL, YAML, refused
 def naive_occupancy(
     code: int, white: int, alpha: int, mode: str, occupied: float, free: float, *, negate: bool
 ) -> int:
-    """What nav2's map server publishes for one pixel, as its documentation says it."""
+    """Return what nav2's map server publishes for one pixel, by its documentation."""
     if mode == "raw":
         value = round(code / white * 255)
         return value if value <= 100 else -1
@@ -42,7 +42,7 @@ def naive_occupancy(
 def test_occupancy(
     mode: str, white: int, negate: bool, percents: tuple[int, int], seed: int
 ) -> None:
-    """Every mode, depth and threshold, pixel by pixel; thresholds that are hit exactly too."""
+    """Every mode, depth and threshold, pixel by pixel, also values equal to a threshold."""
     rng = np.random.default_rng(seed)
     free, occupied = sorted(p / 100 for p in percents)
     edges = [round((1 - t if not negate else t) * white) for t in (free, occupied)]
@@ -61,13 +61,13 @@ def test_occupancy(
 
 
 def grid_of(world: World) -> Grid:
-    """The grid of a world that has one."""
+    """Return a world's grid, which must exist."""
     assert world.grid is not None
     return world.grid
 
 
 def test_map_server(tmp_path: Path) -> None:
-    """Rows from the lowest on, unknown cells as asked, and the origin with its yaw."""
+    """Rows start at the bottom, unknown cells count as requested, the origin has a yaw."""
     (tmp_path / "m.pgm").write_text("P2\n3 2\n# rows of light\n255\n0 255 205\n255 255 100\n")
     path = tmp_path / "m.yaml"
     path.write_text(YAML.replace("image.pgm", "m.pgm").replace("[1, 2, 0]", "[1, 2, 0.5]"))
@@ -145,7 +145,7 @@ BAD = [
 
 @pytest.mark.parametrize(("text", "message"), BAD)
 def test_bad_yaml(text: str, message: str, tmp_path: Path) -> None:
-    """One line with the file, the line and the field."""
+    """The error is one line with file, line number and field."""
     (tmp_path / "image.pgm").write_bytes(PGM)
     path = tmp_path / "m.yaml"
     path.write_text(text)
@@ -154,7 +154,7 @@ def test_bad_yaml(text: str, message: str, tmp_path: Path) -> None:
 
 
 def test_strange_fields_are_said(tmp_path: Path) -> None:
-    """A field that maps do not have may be a misspelt one."""
+    """Unknown fields are reported: they may be misspelt."""
     (tmp_path / "image.pgm").write_bytes(PGM)
     path = tmp_path / "m.yaml"
     path.write_text(YAML + "".join(f'"\\n{i}{"x" * 100}": 1\n' for i in range(50)))
@@ -166,7 +166,7 @@ def test_strange_fields_are_said(tmp_path: Path) -> None:
 
 
 def test_the_image_may_be_named_by_the_user(tmp_path: Path) -> None:
-    """Wherever it is: beside the file or elsewhere."""
+    """The user may name an image in any folder."""
     (tmp_path / "maps").mkdir()
     path = tmp_path / "maps" / "m.yaml"
     path.write_text(YAML.replace("image.pgm", "/nowhere/a.png"))
@@ -180,13 +180,13 @@ def test_the_image_may_be_named_by_the_user(tmp_path: Path) -> None:
 
 
 def saved(image: Image.Image, path: Path) -> Path:
-    """An image in a file."""
+    """Save an image in a file."""
     image.save(path)
     return path
 
 
 def test_images(tmp_path: Path) -> None:
-    """Dark is blocked, the lowest row lies at y = 0; threshold, resolution and inversion."""
+    """Dark is blocked, the lowest row is at y = 0; threshold, resolution and inversion."""
     shades = np.array([[0, 127, 128], [255, 254, 100]], np.uint8)
     path = saved(Image.fromarray(shades), tmp_path / "m.png")
     world = load_world(path)
@@ -205,7 +205,7 @@ def test_images(tmp_path: Path) -> None:
 )
 @pytest.mark.parametrize("mode", ["1", "L", "RGB"])
 def test_kinds_of_images(name: str, mode: str, tmp_path: Path) -> None:
-    """Black and white is the same in all of them."""
+    """Black and white give the same cells in all formats."""
     squares = np.kron(np.array([[0, 1, 1], [1, 0, 1]], np.uint8), np.ones((16, 16), np.uint8))
     image = Image.fromarray(squares * 255).convert("1" if name == "m.pbm" else mode)
     cells = grid_of(load_world(saved(image, tmp_path / name))).cells
@@ -213,7 +213,7 @@ def test_kinds_of_images(name: str, mode: str, tmp_path: Path) -> None:
 
 
 def test_transparent_pixels_are_free(tmp_path: Path) -> None:
-    """Whatever colour they have, inverted or not, and however they are stored."""
+    """Transparent pixels are free, with any colour, inversion and storage."""
     image = np.array([[[0, 0], [0, 255], [0, 128], [255, 0], [255, 255]]], np.uint8)
     path = saved(Image.fromarray(image, "LA"), tmp_path / "m.png")
     blocked = [False, True, True, False, False]
@@ -227,7 +227,7 @@ def test_transparent_pixels_are_free(tmp_path: Path) -> None:
 
 
 def test_deep_images(tmp_path: Path) -> None:
-    """16 bits stay 16 bits: a shade just above the threshold is free."""
+    """16-bit images are not reduced to 8 bits."""
     shades = np.array([[32767, 32768]], np.uint16)
     for name in ("m.png", "m.pgm"):
         path = saved(Image.fromarray(shades), tmp_path / name)
@@ -236,7 +236,7 @@ def test_deep_images(tmp_path: Path) -> None:
 
 
 def lying(path: Path, width: int, height: int) -> Path:
-    """A small PNG, PGM or BMP whose header claims a size."""
+    """Write a small PNG, PGM or BMP whose header states a size."""
     saved(Image.new("L", (3, 3)), path)
     data = bytearray(path.read_bytes())
     if path.suffix == ".pgm":
@@ -252,7 +252,7 @@ def lying(path: Path, width: int, height: int) -> Path:
 
 @pytest.mark.parametrize("name", ["m.png", "m.pgm", "m.bmp"])
 def test_images_that_lie(name: str, tmp_path: Path) -> None:
-    """A header that claims ten thousand million pixels is refused before anything is decoded."""
+    """A header with too many pixels is refused before anything is decoded."""
     for width, height in ((100_000, 100_000), (8193, 8192), (70_000, 2000)):
         path = lying(tmp_path / name, width, height)
         assert "a map has at most 67,108,864" in refused(partial(load_world, path))
@@ -262,7 +262,7 @@ def test_images_that_lie(name: str, tmp_path: Path) -> None:
 
 
 def test_slow_images_are_small(tmp_path: Path) -> None:
-    """A BMP that promises millions of pixels in runs, and has none, takes no time; nor PNM."""
+    """A run-length BMP and a text PNM with millions of pixels are refused at once."""
     runs = lying(tmp_path / "m.bmp", 8000, 8000)
     data = bytearray(runs.read_bytes())
     data[30] = 1
@@ -278,7 +278,7 @@ def test_slow_images_are_small(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["m.png", "m.pgm", "m.bmp", "m.jpg"])
 def test_cut_images(name: str, tmp_path: Path) -> None:
-    """Wherever an image ends too soon, it is refused or whole."""
+    """An image cut anywhere is refused or complete."""
     noise = np.random.default_rng(0).integers(0, 256, (20, 20), np.uint8)
     path = saved(Image.fromarray(noise), tmp_path / name)
     data = path.read_bytes()

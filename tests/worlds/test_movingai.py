@@ -1,4 +1,4 @@
-"""Grid maps: every cell of the file is free or blocked in the world, and bad files say where."""
+"""Grid maps of MovingAI: cells, scenarios, and errors with line numbers."""
 
 import time
 from pathlib import Path
@@ -32,7 +32,7 @@ def test_cells_are_the_files(rows: int, columns: int, seed: int, part: float) ->
 
 
 def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
-    """As files from elsewhere do."""
+    """Line ends, blank lines at the end and a byte order mark are accepted."""
     for end in ("\n", "\r\n", "\r"):
         text = end.join(["type octile", "width 3", "height 2", "map", ".@.", "...", "", ""])
         cells = parse_cells("grid", text.encode())
@@ -61,7 +61,7 @@ def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
     ],
 )
 def test_errors_say_where(text: str, message: str) -> None:
-    """One line, with the number of the line at fault."""
+    """The error is one line with the number of the wrong line."""
     with pytest.raises(BrrtError) as error:
         parse_cells("grid", text.encode())
     assert str(error.value).startswith(message)
@@ -82,7 +82,7 @@ LIST = (
 
 @pytest.fixture
 def scen(tmp_path: Path) -> Path:
-    """A list of scenarios with its map beside it."""
+    """Write scenarios with their map in the same folder."""
     (tmp_path / "grid.map").write_text(MAP)
     path = tmp_path / "grid.map.scen"
     path.write_text(LIST)
@@ -97,7 +97,7 @@ def ends(world: World) -> list[list[float]]:
 
 
 def test_scenarios(scen: Path) -> None:
-    """By number from 0 on, or by bucket; without either the first, and how many there are."""
+    """A scenario is chosen by number or bucket; by default it is the first, with a note."""
     for query, start, goal in (
         ("", [0.5, 0.5], [0.5, 1.5]), ("#0", [0.5, 0.5], [0.5, 1.5]),
         ("#2", [2.5, 0.5], [0.5, 1.5]), ("#bucket=3", [0.5, 1.5], [2.5, 1.5]),
@@ -112,7 +112,7 @@ def test_scenarios(scen: Path) -> None:
 
 
 def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
-    """Beside the file by its bare name, else by its path within the folder, or where one says."""
+    """The map is searched by its bare name, then by its path, or where the user says."""
     (tmp_path / "maps").mkdir()
     (tmp_path / "grid.map").rename(tmp_path / "maps" / "grid.map")
     assert load_world(scen).grid is not None
@@ -152,7 +152,7 @@ def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_bad_scenarios(old: str, new: str, message: str, scen: Path) -> None:
-    """One line with file and line."""
+    """The error is one line with file and line number."""
     assert old in LIST
     scen.write_text(LIST.replace(old, new, 1))
     assert refused(lambda: load_world(scen)).startswith(f"{scen}{message}")
@@ -169,12 +169,12 @@ def test_bad_scenarios(old: str, new: str, message: str, scen: Path) -> None:
     ],
 )
 def test_no_such_scenario(query: str, message: str, scen: Path) -> None:
-    """What there is, is said."""
+    """The error states how many scenarios there are."""
     assert refused(lambda: make_world(f"{scen}#{query}")).startswith(f"{scen}{message}")
 
 
 def test_a_million_cells_load_at_once(tmp_path: Path) -> None:
-    """A map of 1024 x 1024, well under a second even here."""
+    """A map of 1024 x 1024 loads in well under a second."""
     cells = np.random.default_rng(0).random((1024, 1024)) < 0.3
     rows = np.where(cells, ord("T"), ord(".")).astype(np.uint8)
     head = b"type octile\nheight 1024\nwidth 1024\nmap\n"
@@ -188,7 +188,7 @@ def test_a_million_cells_load_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not GRIDS.exists(), reason="no grid maps here")
 def test_real_maps() -> None:
-    """Real files load; their sizes are in their names or headers."""
+    """Real files load with the sizes of their names or headers."""
     for name, size in (("arena", (49, 49)), ("den312d", (65, 81)), ("maze-32-32-2", (32, 32))):
         world = make_world(str(GRIDS / f"{name}.map"))
         assert world.upper.tolist() == list(size)

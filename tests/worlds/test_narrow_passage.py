@@ -1,4 +1,4 @@
-"""The narrowest place on the widest way, against searches that are obvious at a glance."""
+"""The narrowest passage on the widest path, against slow and obvious searches."""
 
 import heapq
 from itertools import product
@@ -23,7 +23,7 @@ FREE = SHAPES.flatmap(lambda shape: arrays(np.bool_, shape))
 @settings(max_examples=30)
 @given(FREE, st.integers(1, 9))
 def test_clearance_is_the_distance_to_what_is_not_free(free: np.ndarray, farthest: int) -> None:
-    """Every cell against every cell that is not free, those around the lattice too."""
+    """Each cell's clearance is the least distance to any cell that is not free."""
     cell = np.array([1.0, 1.5, 0.5])[: free.ndim]
     found = clearance(free, cell, farthest)
     padded = np.pad(free, 1)
@@ -36,7 +36,7 @@ def test_clearance_is_the_distance_to_what_is_not_free(free: np.ndarray, farthes
 
 
 def _widest(square: np.ndarray, start: tuple[int, ...], goal: tuple[int, ...]) -> float:
-    """The greatest least clearance of any way: Dijkstra's algorithm with min for plus."""
+    """Return the greatest least clearance of any path: Dijkstra's algorithm with min for plus."""
     best, waiting = {start: float(square[start])}, [(-float(square[start]), start)]
     while waiting:
         room, at = heapq.heappop(waiting)
@@ -55,7 +55,7 @@ def _widest(square: np.ndarray, start: tuple[int, ...], goal: tuple[int, ...]) -
 @settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_the_bottleneck_is_that_of_the_widest_way(seed: int) -> None:
-    """On a grid map, whose cells are the lattice: width, place, and what lies behind it."""
+    """On a grid map: width, place, and the cells beyond the passage."""
     rng = np.random.default_rng(seed)
     free = rng.random((24, 30)) > 0.12
     grid = Grid(~free, np.zeros(2), 1.0)
@@ -93,7 +93,7 @@ def _uphill(square: np.ndarray, at: np.ndarray) -> tuple[int, ...]:
 @pytest.mark.parametrize("gap", [0.4, 3.7, 12.0])
 @pytest.mark.parametrize("kind", ["gap2d", "passage2d"])
 def test_a_gap_is_as_wide_as_it_was_made(kind: str, gap: float) -> None:
-    """The width is within what is stated, the place in the wall, the goal behind it."""
+    """The width is within the estimates, the place in the wall, the goal beyond it."""
     world = make_world(f"{kind}:gap={gap}")
     assert world.start is not None
     assert world.goal is not None
@@ -107,7 +107,7 @@ def test_a_gap_is_as_wide_as_it_was_made(kind: str, gap: float) -> None:
 
 
 def test_no_way_is_none() -> None:
-    """A goal behind closed walls."""
+    """Closed walls around the goal: no passage, and width 0."""
     boxes = np.array([[4, 4, 9, 5], [4, 8, 9, 9], [4, 4, 5, 9], [8, 4, 9, 9]], float)
     world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=boxes)
     assert narrowest_passage(world, np.array([1.0, 1.0]), np.array([6.5, 6.5])) is None
@@ -117,7 +117,7 @@ def test_no_way_is_none() -> None:
 @settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_what_no_disc_gets_through_is_proven(seed: int) -> None:
-    """On a grid map: no way is wider than the bound, and no way at all where it is 0."""
+    """On a grid map: no path is wider than the bound, and there is none if the bound is 0."""
     rng = np.random.default_rng(seed)
     free = rng.random((24, 30)) > 0.12
     ends = rng.permutation(np.argwhere(free))[:2]
@@ -134,7 +134,7 @@ def test_what_no_disc_gets_through_is_proven(seed: int) -> None:
 
 @pytest.mark.parametrize(("gap", "bound"), [(0.5, 2.1), (3.7, 5.3), (6.0, 7.6), (9.0, np.inf)])
 def test_the_bound_is_near_to_the_width(gap: float, bound: float) -> None:
-    """Within four cells of what is known; beyond what is asked for there is none."""
+    """The bound is within four cells of the true width, or inf beyond the requested width."""
     world = make_world(f"passage2d:gap={gap}")
     assert world.start is not None
     assert world.goal is not None
@@ -144,7 +144,7 @@ def test_the_bound_is_near_to_the_width(gap: float, bound: float) -> None:
 @settings(max_examples=30)
 @given(st.integers(0, 10**6))
 def test_what_is_filled_is_not_free(seed: int) -> None:
-    """Any point of a cell that an obstacle fills touches one; whole boxes are found filled."""
+    """All points of filled cells are occupied; the cells inside a box are filled."""
     rng = np.random.default_rng(seed)
     world = make_world(f"polygons2d:n=6,size=20,seed={seed % 100}")
     lattice = Raster.over(world.lower, world.upper, 900)
@@ -162,7 +162,7 @@ def test_what_is_filled_is_not_free(seed: int) -> None:
 @settings(max_examples=40)
 @given(st.integers(3, 40), st.floats(0.05, 20), st.integers(0, 10**6))
 def test_the_inscribed_disc_is_within(corners: int, flat: float, seed: int) -> None:
-    """It touches three edges at least and crosses none; that of a rectangle is as wide as it."""
+    """The disc crosses no edge; in a rectangle it is as wide as the shorter side."""
     angles = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, corners))
     ring = np.stack([np.cos(angles), flat * np.sin(angles)], axis=1)
     try:

@@ -1,4 +1,4 @@
-"""Occupancy grids: what they cover, as boxes and as JSON, and segments among their cells."""
+"""Occupancy grids: covered points, rectangles, JSON, and segments between cells."""
 
 import base64
 import json
@@ -35,7 +35,7 @@ def _hits(obstacles: ObstacleGrid, A: Floats, B: Floats, out: NDArray[np.bool_])
 
 
 def hits(world: World, A: Floats, B: Floats) -> NDArray[np.bool_]:
-    """Ask the kernel about segments, shape (n, 2) each."""
+    """Test segments, shape (n, 2) each, with the kernel."""
     out = np.zeros(len(A), bool)
     _hits(build_obstacle_grid(world), A, B, out)
     return out
@@ -43,7 +43,7 @@ def hits(world: World, A: Floats, B: Floats) -> NDArray[np.bool_]:
 
 @st.composite
 def tables(draw: st.DrawFn, most: int = 12) -> NDArray[np.bool_]:
-    """Cells of all kinds, from one to a few dozen, empty to full."""
+    """Draw grids from one to a few dozen cells, from empty to full."""
     rows, columns = draw(st.integers(1, most)), draw(st.integers(1, most))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     return rng.random((rows, columns)) < draw(st.sampled_from([0.0, 0.05, 0.3, 0.7, 1.0]))
@@ -52,7 +52,7 @@ def tables(draw: st.DrawFn, most: int = 12) -> NDArray[np.bool_]:
 @MANY
 @given(tables(30))
 def test_rectangles_are_the_blocked_cells(cells: NDArray[np.bool_]) -> None:
-    """Painted back they give the cells, and none is painted twice."""
+    """The rectangles cover exactly the blocked cells, each once."""
     painted = np.zeros(cells.shape, int)
     for x0, y0, x1, y1 in Grid(cells, np.zeros(2), 1.0).rectangles:
         painted[y0:y1, x0:x1] += 1
@@ -71,7 +71,7 @@ def test_runs_of_rows_are_merged() -> None:
 @MANY
 @given(tables(), st.integers(0, 2**32))
 def test_lattice_segments_agree_exactly(cells: NDArray[np.bool_], seed: int) -> None:
-    """Ends on corners, edges and middles of cells: the kernel is right to the last touch."""
+    """Segments between corners, edges and middles of cells: the kernel is exact."""
     rng = np.random.default_rng(seed)
     world = World.of_grid("cells", Grid(cells, np.array([3.0, -2.0]), 0.5))
     sides = 2 * np.array(cells.shape[::-1])
@@ -90,7 +90,7 @@ def test_lattice_segments_agree_exactly(cells: NDArray[np.bool_], seed: int) -> 
     st.sampled_from([0.0, 1e3, -5e6]),
 )
 def test_any_segments(cells: NDArray[np.bool_], seed: int, unit: float, offset: float) -> None:
-    """Never free where it touches; a hit only where it touches, or nearly does."""
+    """The kernel misses no contact, and hits only contacts up to rounding."""
     rng = np.random.default_rng(seed)
     world = World.of_grid("cells", Grid(cells, np.array([offset, -offset]) * unit, unit))
     A = rng.uniform(world.lower, world.upper, (40, 2))
@@ -103,7 +103,7 @@ def test_any_segments(cells: NDArray[np.bool_], seed: int, unit: float, offset: 
 
 
 def test_long_free_stretches_are_crossed_in_strides() -> None:
-    """A single cell far off is not overlooked, wherever it is and from wherever one comes."""
+    """A single distant cell is found from every direction."""
     rng = np.random.default_rng(0)
     for _ in range(30):
         cells = np.zeros((200, 300), bool)
@@ -124,7 +124,7 @@ def test_long_free_stretches_are_crossed_in_strides() -> None:
 @MANY
 @given(tables(), st.integers(0, 2**32), st.floats(-4, 4), st.sampled_from([0.0, 4e6]))
 def test_turned_grids(cells: NDArray[np.bool_], seed: int, yaw: float, offset: float) -> None:
-    """Cells that are walked and polygons made of them are the same, but for what grazes."""
+    """The grid and its polygons give the same hits, except for grazing segments."""
     rng = np.random.default_rng(seed)
     grid = Grid(cells, np.array([offset, -offset]), 0.05, yaw)
     world = World.of_grid("turned", grid)
@@ -141,7 +141,7 @@ def test_turned_grids(cells: NDArray[np.bool_], seed: int, yaw: float, offset: f
 
 
 def test_bounds_beyond_the_grid_are_blocked() -> None:
-    """What the map does not show cannot be driven on, by point or body."""
+    """The outside of a map is blocked for points and bodies."""
     grid = Grid(np.zeros((4, 4), bool), np.array([1.0, 1.0]), 1.0)
     world = World("wide", np.zeros(2), np.full(2, 6.0), grid=grid)
     A = np.array([[2.0, 2.0], [0.5, 3.0], [2.0, 2.0], [3.0, 5.5]])
@@ -155,7 +155,7 @@ def test_bounds_beyond_the_grid_are_blocked() -> None:
 
 
 def test_bodies_among_cells() -> None:
-    """A body meets cells as it meets boxes in their place."""
+    """A body collides with cells as with equal boxes."""
     rng = np.random.default_rng(5)
     cells = rng.random((30, 30)) < 0.05
     for yaw in (0.0, 0.3):
@@ -172,7 +172,7 @@ def test_bodies_among_cells() -> None:
 
 
 def test_json_round_trip() -> None:
-    """Cells, place and turn come back to the last bit, under a version of their own."""
+    """Cells, origin and yaw are read back to the last bit; the version is 2."""
     rng = np.random.default_rng(1)
     for shape in ((1, 1), (3, 5), (64, 9)):
         grid = Grid(rng.random(shape) < 0.4, rng.normal(size=2), 0.05, 0.3)
@@ -188,7 +188,7 @@ def test_json_round_trip() -> None:
 
 
 def bits(count: int) -> str:
-    """Cells as a file has them."""
+    """Return cells as they are stored in JSON."""
     return base64.b64encode(zlib.compress(bytes(count))).decode()
 
 
@@ -231,7 +231,7 @@ def test_wrong_grids(changes: dict[str, Any], message: str) -> None:
 
 
 def test_wrong_cells() -> None:
-    """Tables of truth values alone, in the plane."""
+    """Cells must be a 2D array of truth values, and the world 2D."""
     tables: list[Any] = [np.zeros(3), np.zeros((2, 0)), np.full((2, 2), 7), np.array([["a"]])]
     for cells in tables:
         with pytest.raises(BrrtError, match="cell"):
@@ -241,7 +241,7 @@ def test_wrong_cells() -> None:
 
 
 def test_touching_is_exact_in_thirds() -> None:
-    """A diagonal between two blocked cells that share a corner alone does not pass."""
+    """A diagonal between two blocked cells that share a corner is blocked."""
     cells = np.array([[0, 1], [1, 0]], bool)
     world = World.of_grid("corner", Grid(cells, np.zeros(2), float(Fraction(1, 3))))
     third = 1 / 3
@@ -251,7 +251,7 @@ def test_touching_is_exact_in_thirds() -> None:
 
 
 def test_pictures_stand_as_the_file_does(tmp_path: Path, brrt: Callable[..., Result]) -> None:
-    """A grid map's first line is above in sketches, and stays there when it is saved."""
+    """A grid map's first line is drawn at the top, also after the world is saved."""
     (tmp_path / "m.map").write_text("type octile\nheight 2\nwidth 4\nmap\n@@@@\n....\n")
     brrt("worlds", "make", "m.map", "--out", "m.json")
     for name in ("m.map", "m.json"):

@@ -1,4 +1,4 @@
-"""Worlds and their files: what they promise, and what they refuse."""
+"""Worlds and their files: round trips, geometry and errors."""
 
 import json
 import re
@@ -22,7 +22,7 @@ EVERY = pytest.mark.parametrize("name", list(GENERATORS))
 
 
 def assert_same(one: World, other: World) -> None:
-    """Two worlds are equal bit by bit, but for the name."""
+    """Assert that two worlds are equal bit by bit, except for the name."""
     for field in ("lower", "upper", "balls", "boxes", "start", "goal"):
         a, b = getattr(one, field), getattr(other, field)
         if a is None or b is None:
@@ -35,7 +35,7 @@ def assert_same(one: World, other: World) -> None:
 
 
 def refused(action: Callable[[], object]) -> str:
-    """The message of the BrrtError that an action raises: one line."""
+    """Return the message of the BrrtError that an action raises; it must be one line."""
     with pytest.raises(BrrtError) as error:
         action()
     assert "\n" not in str(error.value)
@@ -47,7 +47,7 @@ def refused(action: Callable[[], object]) -> str:
 
 @st.composite
 def worlds(draw: st.DrawFn) -> World:
-    """Any world that is one."""
+    """Draw any valid world."""
     dim = draw(st.sampled_from([2, 3]))
     number = st.floats(-1e99, 1e99)
     point = st.lists(number, min_size=dim, max_size=dim)
@@ -62,7 +62,7 @@ def worlds(draw: st.DrawFn) -> World:
 
 @given(worlds())
 def test_json_round_trip(world: World) -> None:
-    """What to_json writes, from_json reads back to the last bit."""
+    """from_json reads back what to_json wrote, to the last bit."""
     again = World.from_json(world.to_json())
     assert_same(world, again)
     assert again.name == world.name
@@ -88,7 +88,7 @@ GOOD: dict[str, Any] = {
 
 
 def test_good_json() -> None:
-    """The file that the wrong ones below are made from is right, as is a bare one."""
+    """The base of the wrong files below is valid, and so is a minimal one."""
     world = World.from_json(json.dumps(GOOD))
     assert world.boxes.tolist() == [[2, 0, 3, 1]]
     assert world.balls.tolist() == [[1, 1, 0.5]]
@@ -145,7 +145,7 @@ def test_good_json() -> None:
     ],
 )
 def test_wrong_json(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
-    """Each error names the field, and the file where there is one."""
+    """Each error names the field, and the file if there is one."""
     data = {key: value for key, value in (GOOD | changes).items() if value is not ...}
     text = json.dumps(data)
     assert message in refused(lambda: World.from_json(text))
@@ -158,7 +158,7 @@ def test_wrong_json(changes: dict[str, Any], message: str, tmp_path: Path) -> No
     "text", ["", "{", "[]", "7", "null", '"text"', "[" * 100_000, "\x00", "{}", "nan"]
 )
 def test_no_json_world(text: str) -> None:
-    """Texts that are no JSON or no world are refused."""
+    """Texts that are not JSON or not a world are refused."""
     assert re.search(
         "not a (JSON|brrt) world|not a whole brrt world", refused(lambda: World.from_json(text))
     )
@@ -176,7 +176,7 @@ json_values = st.recursive(
 @settings(max_examples=200)
 @given(st.sampled_from(["lower", "upper", "balls", "boxes", "start", "goal", "name"]), json_values)
 def test_any_json_value_is_read_or_refused(field: str, value: Any) -> None:
-    """A field of any kind leads to a world or to a BrrtError, never to another error."""
+    """Any value of a field gives a world or a BrrtError."""
     try:
         world = World.from_json(json.dumps(GOOD | {field: value}))
     except BrrtError:
@@ -277,7 +277,7 @@ def test_wrong_blocks_name_file_and_line(line: str, message: str, tmp_path: Path
     ],
 )
 def test_maps_that_lack_something(text: str, message: str, tmp_path: Path) -> None:
-    """Errors of the whole name the file."""
+    """Errors without a line name the file."""
     error = refused(lambda: blocks(text, tmp_path))
     assert error.startswith(f"{tmp_path / 'map.txt'}:")
     assert message in error
@@ -288,14 +288,14 @@ def test_maps_that_lack_something(text: str, message: str, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", ["none.json", "none.txt", "deep/er/none.txt"])
 def test_missing_file(name: str, tmp_path: Path) -> None:
-    """A file that is not there is named."""
+    """The error names a missing file."""
     path = tmp_path / name
     assert refused(lambda: make_world(str(path))).startswith(f"{path}: No such file")
 
 
 @pytest.mark.parametrize("name", ["map.txt", "map.json"])
 def test_binary_file(name: str, tmp_path: Path) -> None:
-    """Bytes that are no text are refused."""
+    """Binary files are refused."""
     path = tmp_path / name
     path.write_bytes(bytes(range(256)))
     assert refused(lambda: load_world(path)) == f"{path}: not a text file"
@@ -303,7 +303,7 @@ def test_binary_file(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["map.zip", "map", "map.TXT.gz"])
 def test_foreign_file(name: str, tmp_path: Path) -> None:
-    """A file of another kind is refused, and the message says which kinds there are."""
+    """A file of an unknown format is refused; the message lists the suffixes."""
     path = tmp_path / name
     path.write_text("wall 0 0 0 1 1 1")
     error = refused(lambda: make_world(str(path)))
@@ -331,7 +331,7 @@ def test_a_folder_is_no_world(name: str, tmp_path: Path) -> None:
     ],
 )
 def test_real_maps(name: str, count: int | None, upper: list[float] | None) -> None:
-    """The course maps load; a count by other means finds as many blocks; their queries are free."""
+    """The course maps load with all their blocks, and their queries are free."""
     path = MAPS / f"{name}.txt"
     world = load_world(path)
     lines = re.findall(r"(?m)^\s*block\b", path.read_text())
@@ -353,7 +353,7 @@ def polygon_world(*polygons: object) -> World:
 
 
 def test_polygons_are_brought_in_order() -> None:
-    """Counter-clockwise, without vertices that repeat or lie on an edge; and that stays so."""
+    """Polygons become counter-clockwise, without repeated or collinear vertices."""
     world = polygon_world(
         [[1, 1], [1, 3], [2, 3], [3, 3], [3, 3], [3, 1]], [[5, 5], [6, 5]], [[5, 5], [6, 5], [5, 5]]
     )
@@ -382,12 +382,12 @@ def test_polygons_are_brought_in_order() -> None:
     ],
 )
 def test_bad_polygons(polygon: object, message: str) -> None:
-    """One line that names the polygon and the remedy."""
+    """The error is one line that names the polygon and the remedy."""
     assert message in refused(lambda: polygon_world(polygon))
 
 
 def test_polygons_are_for_the_plane() -> None:
-    """A 3D world has none."""
+    """A 3D world cannot have polygons."""
     corner = [[0, 0], [1, 0], [0, 1]]
     flat, cube = (np.zeros(2), np.ones(2)), (np.zeros(3), np.ones(3))
     why = refused(lambda: World("w", *cube, polygons=(np.array(corner),)))
