@@ -11,7 +11,6 @@ from brrt.explanation.commands import (
     extend,
     file_of,
     replan,
-    replan_longer,
     resume,
     rounded,
     show,
@@ -70,7 +69,7 @@ def short_step(f: Facts) -> Advice | None:
         return None
     if is_stuck(f) and f.narrow is not None and wide > f.narrow.high:
         return None
-    return replan_longer(f, why, params={"step": rounded(wide)})
+    return replan(f, why, 4, params={"step": rounded(wide)})
 
 
 def lookahead(f: Facts) -> Advice | None:

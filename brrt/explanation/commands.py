@@ -130,6 +130,7 @@ def resume(
 def replan(
     f: Facts,
     why: str,
+    times: float | None = None,
     *,
     planner: str | None = None,
     params: Mapping[str, Any] | None = None,
@@ -140,10 +141,13 @@ def replan(
     Args:
         f: The facts.
         why: Those that the advice follows from.
+        times: The multiple of the budget that is advised if the budget ended the run.
         planner: Another planner; `params` are then all that is set.
         params: Settings of the planner that change.
         settings: Fields of the scenario that change; None removes a limit.
     """
+    if times is not None and ended_by_budget(f):
+        settings |= _budget(f, round(times), 1)
     fixed = set(f.contract.planner.fixed_params)
     if f.manifest.branches and planner is None and not fixed & set(params or {}):
         given = {name: value for name, value in settings.items() if value is not None}
@@ -172,27 +176,6 @@ def extend(
         params: Settings of the planner that change.
     """
     return resume(f, why, params=params, **_budget(f, times, least))
-
-
-def replan_longer(
-    f: Facts,
-    why: str,
-    times: float = 4,
-    *,
-    planner: str | None = None,
-    params: Mapping[str, Any] | None = None,
-) -> Advice:
-    """Advise to plan from the start with changes, and a larger budget if that ended the run.
-
-    Args:
-        f: The facts.
-        why: Those that the advice follows from.
-        times: The multiple of the budget.
-        planner: Another planner; `params` are then all that is set.
-        params: Settings of the planner that change.
-    """
-    more = _budget(f, round(times), 1) if ended_by_budget(f) else {}
-    return replan(f, why, planner=planner, params=params, **more)
 
 
 def _budget(f: Facts, times: int, least: int) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from brrt.explanation.commands import (
     extend,
     file_of,
     replan,
-    replan_longer,
     resume,
     rounded,
     show,
@@ -110,7 +109,7 @@ def goal_bias(f: Facts) -> Advice | None:
         return None
     bias = draws.goal_bias
     if bias == 0 and not f.figures["solved"]:
-        return replan_longer(f, "goal bias 0 never samples the goal", params={"goal_bias": 0.05})
+        return replan(f, "goal bias 0 never samples the goal", 4, params={"goal_bias": 0.05})
     goals = f.goals
     share = 0.0 if goals is None else goals.failed / max(f.figures["iterations"], 1)
     if goals is None or share <= 0.2 or goals.failed < 0.5 * goals.drawn or bias <= 0.05:
@@ -120,7 +119,7 @@ def goal_bias(f: Facts) -> Advice | None:
         f"goal bias {bias:g} sampled the goal {counted(goals.drawn, 'time')}, and {goals.failed:,} "
         f"of these samples were rejected{by}: {share:.0%} of the run"
     )
-    return replan_longer(f, why, params={"goal_bias": 0.05})
+    return replan(f, why, 4, params={"goal_bias": 0.05})
 
 
 def spreading(f: Facts) -> Advice | None:
@@ -147,7 +146,7 @@ def cramped(f: Facts) -> Advice | None:
         f"{f.acceptance:.1%} of {f.accepted + f.failed:,} extensions were accepted, and no node "
         f"came nearer to the goal in the last {f.approach.since:.0%} of the run"
     )
-    return replan_longer(f, why, 10, planner=planner, params=same_step(f))
+    return replan(f, why, 10, planner=planner, params=same_step(f))
 
 
 def second_tree(f: Facts) -> Advice | None:
@@ -165,7 +164,7 @@ def second_tree(f: Facts) -> Advice | None:
         why = f"no node came nearer to the goal in the last {f.approach.since:.0%} of the run"
     else:
         return None
-    return replan_longer(f, why, planner=planner, params=same_step(f))
+    return replan(f, why, 4, planner=planner, params=same_step(f))
 
 
 def long_step(f: Facts) -> Advice | None:
@@ -176,7 +175,7 @@ def long_step(f: Facts) -> Advice | None:
     why = f"step {step:g} is longer than the passage is wide ({width_of(f)}): no node got through"
     # With a tenth of the step the same distance takes ten times the nodes.
     shorter = rounded(max(fitting_step(f), step / MOST_CUT))
-    return replan_longer(f, why, max(4, step / shorter), params={"step": shorter})
+    return replan(f, why, max(4, step / shorter), params={"step": shorter})
 
 
 def same_step(f: Facts) -> dict[str, Any]:

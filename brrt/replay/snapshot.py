@@ -22,7 +22,7 @@ class Snapshot:
 
     Attributes:
         recording: The run.
-        limits: The instant, as `Events.until` takes it; the end of the run where it is empty.
+        limits: The instant, as `Events.until` takes it; the end of the run if it is empty.
     """
 
     recording: Recording

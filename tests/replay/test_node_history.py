@@ -60,9 +60,9 @@ class Naive:
 
 
 def _cost_changes(log: Events, number: int, node: int) -> tuple[Naive, list[tuple[Any, ...]]]:
-    """Play a tree's events; return it, and each change of the node's cost or parent."""
+    """Replay a tree's events; return it, and each change of the node's cost or parent."""
     events = [e for k in (Kind.EDGE, Kind.REWIRE) for e in log[k] if e["tree"] == number]
-    tree, turns = Naive(), []
+    tree, changes = Naive(), []
     for event in sorted(events, key=lambda event: int(event["seq"])):
         rewires = "q" not in event.dtype.names and len(tree.q) > node
         before = (tree.parent[event["node"]], tree.cost(node)) if rewires else None
@@ -70,14 +70,14 @@ def _cost_changes(log: Events, number: int, node: int) -> tuple[Naive, list[tupl
         if before is not None:
             after = tree.cost(node)
             if event["node"] == node or abs(after - before[1]) > 1e-9:
-                turns.append((int(event["seq"]), int(event["node"]), *before, after))
-    return tree, turns
+                changes.append((int(event["seq"]), int(event["node"]), *before, after))
+    return tree, changes
 
 
 @settings(max_examples=30)
 @given(data=st.data())
-def test_a_nodes_history_is_what_happened_to_it(data: st.DataObject) -> None:
-    """Birth, rewires, ancestors' rewires, costs, descendants and rejections, at any instant."""
+def test_the_history_of_a_node(data: st.DataObject) -> None:
+    """Its parents, costs, rewires, subtree and rejections at any instant, against a slow twin."""
     scenario = data.draw(st.sampled_from([STAR, PAIR]))
     _, log = recorded(scenario)
     at = data.draw(st.integers(20, len(log) - 1))
@@ -90,13 +90,15 @@ def test_a_nodes_history_is_what_happened_to_it(data: st.DataObject) -> None:
         node, number
     )
     assert isinstance(found, NodeHistory)
-    naive, turns = _cost_changes(part, number, node)
+    naive, expected = _cost_changes(part, number, node)
     assert found.born.event == edges["seq"][node]
     assert (found.born_parent, found.born_cost) == (edges["parent"][node], edges["cost"][node])
-    told = sorted(found.rewires + found.follows, key=lambda turn: turn.when.event)
-    assert [(t.when.event, t.node, t.old_parent) for t in told] == [t[:3] for t in turns]
-    assert np.allclose([(t.before, t.after) for t in told], [t[3:] for t in turns], rtol=1e-12)
-    assert all(turn.node == node for turn in found.rewires)
+    changes = sorted(found.rewires + found.follows, key=lambda change: change.when.event)
+    assert [(c.when.event, c.node, c.old_parent) for c in changes] == [c[:3] for c in expected]
+    assert np.allclose(
+        [(c.before, c.after) for c in changes], [c[3:] for c in expected], rtol=1e-12
+    )
+    assert all(change.node == node for change in found.rewires)
     assert (found.parent, found.lineage) == (naive.parent[node], naive.lineage(node))
     assert found.cost == pytest.approx(naive.cost(node), rel=1e-12)
     everyone = range(len(naive.q))
@@ -106,7 +108,7 @@ def test_a_nodes_history_is_what_happened_to_it(data: st.DataObject) -> None:
     mine = rejects[(rejects["node"] == node) & (rejects["tree"] == number)]
     assert [each.when.event for each in found.rejects] == mine["seq"].tolist()
     for each, row in zip(found.rejects, mine, strict=True):
-        # What the planner turned down for a collision hits something.
+        # An extension that was rejected for a collision hits an obstacle.
         blocked = row["reason"] in (Reason.COLLISION, Reason.NEAR_BLOCKED, Reason.LINK_BLOCKED)
         assert (each.hit is not None) == blocked
 
@@ -147,12 +149,12 @@ def test_a_cells_history() -> None:
     for cell in np.unique(log[Kind.EXPAND]["cell"])[::7].tolist():
         found = snapshot(run).node(cell)
         assert isinstance(found, CellHistory)
-        for kind, told in (
+        for kind, listed in (
             (Kind.EXPAND, [look.when.event for look in found.looks]),
             (Kind.HEURISTIC, [lesson.when.event for lesson in found.lessons]),
             (Kind.MOVE, [visit.event for visit in found.visits]),
         ):
-            assert told == log[kind]["seq"][log[kind]["cell"] == cell].tolist()
+            assert listed == log[kind]["seq"][log[kind]["cell"] == cell].tolist()
         steps = [found.distance, *(lesson.after for lesson in found.lessons)]
         assert steps == sorted(steps)
         assert [lesson.before for lesson in found.lessons] == steps[:-1]
@@ -168,10 +170,10 @@ def test_node_on_the_command_line(brrt: Command) -> None:
     done = brrt("replay", "a.mcap", "--node", node, "--tree", "goal", *at, "--json")
     assert done.json == found.node(node, 1).as_dict()
     assert brrt("replay", "a.mcap", "--node", node, "--tree", 1, *at, "--json").json == done.json
-    told = brrt("replay", "a.mcap", "--node", node, "--tree", "goal", *at)
-    assert (told.code, told.err) == (0, "")
-    assert f"{node} of tree 1 (goal)" in told.out
-    assert "rewired" in told.out
+    shown = brrt("replay", "a.mcap", "--node", node, "--tree", "goal", *at)
+    assert (shown.code, shown.err) == (0, "")
+    assert f"{node} of tree 1 (goal)" in shown.out
+    assert "rewired" in shown.out
     late = brrt("replay", "a.mcap", "--node", 0, "--at", "1000s")
     assert late.err.startswith("brrt: the recording ends at")
     brrt("plan", "--planner", "lrta-star", "--world", "empty2d:size=5", "--out", "b.mcap")
@@ -192,7 +194,7 @@ def test_node_on_the_command_line(brrt: Command) -> None:
         ),
         (["--node", "1", "--tree", "gaol"], "--tree must be start, goal or the number of a tree"),
         (["--tree", "goal"], "add --node"),
-        (["--node", "1", "--text"], "--node goes with --at"),
+        (["--node", "1", "--text"], "--node excludes --text"),
     ],
 )
 def test_bad_nodes_are_one_line(args: list[str], message: str, brrt: Command) -> None:
@@ -219,9 +221,9 @@ def test_rejections_left_out_add_up(brrt: Command) -> None:
     brrt("plan", "--world", "gap2d:gap=1", "--iterations", 500, "--out", "run.mcap")
     node = int(np.bincount(read(Path("run.mcap")).events()[Kind.REJECT]["node"]).argmax())
     done = brrt("replay", "run.mcap", "--node", node).out
-    told = re.search(r"(\d+) extensions? from this node", done)
+    total = re.search(r"(\d+) extensions? from this node", done)
     more = re.search(r"\.\.\. (\d+) more, the last:", done)
-    assert told is not None
+    assert total is not None
     assert more is not None
     listed = re.findall(r"^ +event ", done, re.MULTILINE)
-    assert int(told[1]) == len(listed) + int(more[1])
+    assert int(total[1]) == len(listed) + int(more[1])

@@ -104,15 +104,15 @@ def test_the_event_of_an_instant_is_printed(brrt: Callable[..., Result]) -> None
     log = read(Path("a.mcap")).events()
     chosen = [int(log[kind]["seq"][-1]) for kind in (Kind.EDGE, Kind.REWIRE, Kind.PHASE)]
     for seq in (0, 4, *chosen):
-        told = brrt("replay", "a.mcap", "--at-event", seq).out.split(f"event {seq:,}")[1]
-        told = told.partition(":")[2]
+        text = brrt("replay", "a.mcap", "--at-event", seq).out.split(f"event {seq:,}")[1]
+        text = text.partition(":")[2]
         numbers = [
-            int(n) for n in re.findall(r"^ +(\d+)  [a-z]", told.replace(",", ""), re.MULTILINE)
+            int(n) for n in re.findall(r"^ +(\d+)  [a-z]", text.replace(",", ""), re.MULTILINE)
         ]
         assert numbers == list(range(max(0, seq - 9), seq + 1))
-        assert max(map(len, told.splitlines())) <= 80
+        assert max(map(len, text.splitlines())) <= 80
     q = log[Kind.EDGE]["q"][-1].tolist()
-    told = " ".join(brrt("replay", "a.mcap", "--at-event", chosen[0]).out.split())
-    assert all(repr(x) in told for x in q)
+    text = " ".join(brrt("replay", "a.mcap", "--at-event", chosen[0]).out.split())
+    assert all(repr(x) in text for x in q)
     late = brrt("replay", "a.mcap", "--at-event", len(log) + 5)
     assert f"event {len(log) - 1:,} and the events before it" in late.out

@@ -1,4 +1,4 @@
-"""A run told in plain text: what it says is what happened, on every machine the same."""
+"""Transcripts: true to the log, and the same on every machine."""
 
 import re
 from collections.abc import Callable
@@ -12,6 +12,7 @@ import brrt
 from brrt.events import Kind
 from brrt.replay.transcript import transcript
 from tests.conftest import Result
+from tests.support.logs import split
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 FILES = sorted(RECORDINGS.glob("*.mcap"))
@@ -19,13 +20,13 @@ FILES = sorted(RECORDINGS.glob("*.mcap"))
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_counts_are_the_logs(path: Path) -> None:
-    """All that is counted adds up to the events of each kind, whatever the phases."""
+    """The counts of all phases add up to the events of each kind."""
     recording = brrt.read(path)
     text, events = transcript(recording), recording.events()
     for kind, word in ((Kind.SAMPLE, "samples?"), (Kind.REJECT, "rejected"), (Kind.MOVE, "moves?"),
                        (Kind.EDGE, "nodes?"), (Kind.EXPAND, "cells? expanded")):  # fmt: skip
-        told = re.findall(rf"^[\d,]*\s+([\d,]+) {word}\b", text, re.MULTILINE)
-        assert sum(int(number.replace(",", "")) for number in told) == len(events[kind])
+        counts = re.findall(rf"^[\d,]*\s+([\d,]+) {word}\b", text, re.MULTILINE)
+        assert sum(int(number.replace(",", "")) for number in counts) == len(events[kind])
     paths = events[Kind.PATH]
     assert text.count("first path") == min(1, len(paths))
     for cost in {paths["cost"][0], paths["cost"][-1]} if len(paths) else ():
@@ -34,20 +35,14 @@ def test_counts_are_the_logs(path: Path) -> None:
 
 @pytest.mark.parametrize("size", [1, 7, 100])
 def test_batches_do_not_matter(size: int) -> None:
-    """However the events are cut into batches, the account is one."""
+    """However the events are split into batches, the transcript is the same."""
     recording = brrt.read(RECORDINGS / "circles2d-rrt-star.mcap")
-    events = recording.events()
-    parts, before = [], 0
-    for end in range(size, len(events) + size, size):
-        part = events.until(seq=end - 1)
-        tables = {kind: table[table["seq"] >= before] for kind, table in part.tables.items()}
-        parts.append(brrt.Events(events.dof, {k: t for k, t in tables.items() if len(t)}))
-        before = end
+    parts = split(recording.events(), size)
     assert transcript(replace(recording, batches=lambda: parts)) == transcript(recording)
 
 
 def test_no_time_and_no_folder(tmp_path: Path) -> None:
-    """Runs of one seed are told alike, wherever the world lies and whatever the clock says."""
+    """Runs of one seed have one transcript, whatever the folder and the clock."""
     world = brrt.make_world("circles2d:n=30,seed=2")
     texts = []
     for folder in ("one", "two"):
@@ -60,8 +55,8 @@ def test_no_time_and_no_folder(tmp_path: Path) -> None:
     assert str(tmp_path) not in texts[0]
 
 
-def test_failure_says_how_near_it_came() -> None:
-    """The nearest node is the one nearest by the robot's metric."""
+def test_failures_name_the_nearest_node() -> None:
+    """It is the nearest one in the robot's metric."""
     recording = brrt.read(RECORDINGS / "spheres3d-unsolved.mcap")
     edges = recording.events()[Kind.EDGE]
     far = recording.robot().distance(edges["q"], np.array(recording.manifest.goal))
@@ -71,8 +66,8 @@ def test_failure_says_how_near_it_came() -> None:
     assert f"node {best['node']:,} of iteration {best['iteration']:,}, {far.min():.6g}" in text
 
 
-def test_replay_prints_it(brrt: Callable[..., Result]) -> None:
-    """As a user asks for it; whole, and up to an instant."""
+def test_replay_prints_the_transcript(brrt: Callable[..., Result]) -> None:
+    """The whole one, and one up to an instant."""
     path = str(RECORDINGS / "circles2d-rrt.mcap")
     done = brrt("replay", path, "--text")
     assert done.out == Path(path).with_suffix(".txt").read_text("utf-8")
