@@ -80,8 +80,8 @@ def application(world: World, what: str) -> str:
     """
     size = " x ".join(f"{side:g}" for side in world.upper - world.lower)
     corner = ", ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
-    ways = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
-    return " ".join(["brrt", what, size, *ways])
+    details = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
+    return " ".join(["brrt", what, size, *details])
 
 
 def places(values: Any, robot: Robot) -> NDArray[np.float32]:

@@ -32,8 +32,8 @@ def draw_ring(
     ]
     layer = {"draw_order": 110} if world.dim == 2 else {}
     strips: Any = rr.LineStrips2D if world.dim == 2 else rr.LineStrips3D
-    rec.log("/world/mark", strips(rings, colors=RING, radii=-2, **layer), static=True)
-    log_label(rec, world, "mark", place, RING, text, radius + 0.012)
+    rec.log("/world/ring", strips(rings, colors=RING, radii=-2, **layer), static=True)
+    log_label(rec, world, "ring", place, RING, text, radius + 0.012)
 
 
 def place_of(
