@@ -42,10 +42,7 @@ def save_world(world: World, path: Path) -> None:
 def save_figure(figure: Any, path: Path, **how: Any) -> None:
     """Write a figure without a date, so that equal figures give equal files.
 
-    Args:
-        figure: The matplotlib figure.
-        path: The file; it appears once it is complete.
-        how: Other arguments of `savefig`.
+    The file appears once it is complete. `how` are other arguments of `savefig`.
 
     Raises:
         BrrtError: The file cannot be written.
@@ -58,14 +55,9 @@ def save_figure(figure: Any, path: Path, **how: Any) -> None:
 
 
 def plot_world(world: World, ax: Any = None) -> Any:
-    """Draw a world.
+    """Draw a world into axes, by default new ones; return them.
 
-    Args:
-        world: The world.
-        ax: Axes of matplotlib, with projection "3d" for a world in 3D; new ones by default.
-
-    Returns:
-        The axes.
+    The axes of a world in 3D have the projection "3d".
 
     Raises:
         BrrtError: matplotlib is missing, or the projection of the axes is not the world's.
