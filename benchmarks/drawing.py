@@ -1,9 +1,9 @@
-"""What the picture costs: a Rerun file with everything drawn, against the bare events.
+"""The cost of drawing: a Rerun file with the drawing, against one with the bare events.
 
     python benchmarks/drawing.py [--events 200000] [--repeats 5]
 
-The bare file holds the same columns, sent in the same batches by `send_columns`, and nothing else.
-Processor time counts all threads; where others compute too, it tells more than the clock.
+The bare file has the same columns, sent in the same batches by `send_columns`, and nothing else.
+Processor time counts all threads; on a busy machine it is the better measure.
 """
 
 import argparse
@@ -27,11 +27,11 @@ RUNS: dict[str, dict[str, Any]] = {
     "rrt-star, 2D": {"world": "squares2d:n=100", "planner": "rrt-star"},
     "bi-rrt-star, 2D": {"world": "squares2d:n=100", "planner": "bi-rrt-star"},
 }
-"""Runs that last as long as they may."""
+"""Runs that use their whole budget."""
 
 
 def recorded(settings: dict[str, Any], events: int) -> tuple[Run, list[Events]]:
-    """Plan until there are so many events; keep them in batches."""
+    """Plan until there are enough events; return the run and its batches."""
     run, log = Run(Scenario(**settings, iterations=events, smooth=False)), Memory()
     count = 0
     for batch in run.events():
@@ -43,7 +43,7 @@ def recorded(settings: dict[str, Any], events: int) -> tuple[Run, list[Events]]:
 
 
 def drawn(run: Run, batches: list[Events], path: Path) -> None:
-    """Write the file as brrt does."""
+    """Write the file with the drawing."""
     sink = RerunSink(run.manifest, run.problem.world, path=path)
     for batch in batches:
         sink.write(batch)
@@ -51,7 +51,7 @@ def drawn(run: Run, batches: list[Events], path: Path) -> None:
 
 
 def bare(run: Run, batches: list[Events], path: Path) -> None:
-    """Write the events alone."""
+    """Write the bare events."""
     rec: Any = rr.RecordingStream("bare", recording_id=str(run.manifest.epoch_ns))
     rr.set_log_time_enabled(False, recording=rec)
     rec.save(path)
@@ -70,14 +70,14 @@ def bare(run: Run, batches: list[Events], path: Path) -> None:
 
 
 def seconds(write: Callable[[Run, list[Events], Path], None], *args: Any) -> tuple[float, float]:
-    """How long a file takes, by the clock and in processor time."""
+    """Return the wall time and the processor time of writing a file."""
     began, busy = time.perf_counter(), time.process_time()
     write(*args)
     return time.perf_counter() - began, time.process_time() - busy
 
 
 def main() -> None:
-    """Measure side by side and print a line each."""
+    """Measure and print a line for each run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--events", type=int, default=200_000)
     parser.add_argument("--repeats", type=int, default=5)

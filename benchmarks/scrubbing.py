@@ -1,9 +1,9 @@
-"""How long the viewer takes to show another instant of a tree, by the number of edges drawn.
+"""The time that the viewer takes to show another instant of a tree, by the number of drawn edges.
 
     python benchmarks/scrubbing.py [--edges 10000,50000,100000] [--planner rrt]
 
-It runs without a window; where there is no GPU, a software driver rasterises, and the picture of
-a few edges takes most of a second already. So what counts is how the times grow.
+It runs without a window. Without a GPU, a software driver takes most of a second even for a few
+edges, so the growth of the times is what counts.
 """
 
 import argparse
@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from brrt import Kind, Run, Scenario
-from brrt.views.rerun.sink import RerunSink
+from brrt import Kind, Memory, Run, Scenario
+from brrt.views.rerun.drawing import draw_run
 from brrt.views.viewer.control import Cursor, headless, shoot
 
 RUNS: dict[str, dict[str, Any]] = {
@@ -22,24 +22,24 @@ RUNS: dict[str, dict[str, Any]] = {
     "rrt-star": {"world": "squares2d:n=100"},
 }
 INSTANTS = (0.9, 0.95, 0.99, 0.93, 0.97)
-"""Parts of the run: nearly all edges are in sight at each."""
+"""Parts of the run; at each, nearly all edges are visible."""
 
 
 def grown(planner: str, edges: int, path: Path) -> tuple[int, int]:
-    """Draw a tree of so many edges into a file; return how many it has, and its events."""
+    """Draw a tree of at least so many edges into a file; return the number of edges and events."""
     run = Run(Scenario(planner=planner, iterations=100 * edges, smooth=False, **RUNS[planner]))
-    sink, nodes, events = RerunSink(run.manifest, run.problem.world, path=path), 0, 0
+    memory, nodes = Memory(), 0
     for batch in run.events():
-        sink.write(batch)
-        nodes, events = nodes + batch.counts.get(Kind.EDGE, 0), events + len(batch)
+        memory.write(batch)
+        nodes += batch.counts.get(Kind.EDGE, 0)
         if nodes > edges:
             break
-    sink.close(None)
-    return nodes - 1, events
+    draw_run(path, memory.recording(run.manifest, run.problem.world))
+    return nodes - 1, sum(map(len, memory.batches))
 
 
 def seconds(path: Path, events: int) -> tuple[float, float, list[float]]:
-    """Return how long it takes to open a file, to draw it again, and to seek."""
+    """Return the times to open a file, to draw it again, and to seek."""
     with headless((1600, 1000)) as client:
         began = time.perf_counter()
         shoot(client, path, Cursor("event", events // 2))

@@ -1,10 +1,10 @@
-"""Make the pictures of the README and of the gallery anew, runs included.
+"""Make the pictures of the README and of the gallery, and the runs that they show.
 
     python docs/screenshot.py
     python docs/screenshot.py rrt2d.png web.png --to FOLDER
 
-It needs `pip install -e '.[test]'`; `brrt view --screenshot` says what to install where the viewer
-cannot run. The picture of the browser needs Chromium, and is left out where there is none.
+It needs `pip install -e '.[test]'`; if the viewer cannot run, `brrt view --screenshot` says what to
+install. Without Chromium the picture of the browser is left out.
 """
 
 import argparse
@@ -21,12 +21,12 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from tests.support.browser import CHROMIUM, browser  # noqa: E402 - it is no package that is installed
+from tests.support.browser import CHROMIUM, browser  # noqa: E402 - it is not installed
 
 SIZE, WIDTH = (1600, 900), 1024
-"""Of the viewer and of the pictures, in pixels: a few hundred kB would be too much to load."""
+"""Size of the viewer and width of the pictures, in pixels; a page loads small pictures faster."""
 SLIDER = 0.62, 0.981
-"""Where the browser's time slider is clicked, as parts of the page."""
+"""Where the time slider is clicked, as parts of the page."""
 
 STAR = "--planner rrt-star --seed 3 --iterations 600"
 
@@ -35,8 +35,8 @@ class Picture(NamedTuple):
     """How a picture is made.
 
     Attributes:
-        runs: What `brrt plan` is told, for one run or two.
-        shown: What `brrt view` is told, or `brrt plot` if that is its first word, or "web".
+        runs: Options of `brrt plan`, for one run or two.
+        shown: Options of `brrt view`, or of `brrt plot` after the word "plot", or "web".
     """
 
     runs: tuple[str, ...]
@@ -75,7 +75,7 @@ def make(name: str, folder: Path) -> None:
         for run, options in zip(runs, picture.runs, strict=True):
             brrt("plan", *options.split(), "--out", run, "--json", quiet=True)
         if picture.shown == "web":
-            surf(runs[0], out)
+            take_web_picture(runs[0], out)
         elif picture.shown.startswith("plot "):
             brrt(*picture.shown.split(), "--out", str(out), "--force")
         else:
@@ -87,13 +87,13 @@ def make(name: str, folder: Path) -> None:
 
 
 def brrt(*args: str, quiet: bool = False) -> None:
-    """Run the command that stands beside this Python."""
+    """Run the command of this Python's environment."""
     command = [str(Path(sys.executable).with_name("brrt")), *args]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL if quiet else None)
 
 
-def surf(run: str, out: Path) -> None:
-    """Take a picture of the viewer in the browser, somewhere in the run."""
+def take_web_picture(run: str, out: Path) -> None:
+    """Take a picture of the viewer in the browser, in the middle of the run."""
     command = [str(Path(sys.executable).with_name("brrt")), "view", run, "--web"]
     with (
         subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server,
@@ -104,29 +104,29 @@ def surf(run: str, out: Path) -> None:
             address = server.stdout.readline().split(" at ")[1].strip()
             with browser(Path(profile), SIZE, 300) as page:
                 page.visit(address)
-                stand_still(page.picture)
+                picture_at_rest(page.picture)
                 page.click(*(part * side for part, side in zip(SLIDER, SIZE, strict=True)))
-                out.write_bytes(stand_still(page.picture))
+                out.write_bytes(picture_at_rest(page.picture))
         finally:
             server.terminate()
             server.wait()
 
 
-def stand_still(look: Callable[[], bytes]) -> bytes:
-    """Return a picture once it is no other than 2 s before: loading shows in between."""
+def picture_at_rest(take: Callable[[], bytes]) -> bytes:
+    """Return a picture once it equals the one 2 s before: while it loads, it changes."""
     last, png = b"", b"?"
     while not png or png != last:
         time.sleep(2)
-        last, png = png, look()
+        last, png = png, take()
     return png
 
 
 def shrink(picture: Path) -> None:
-    """Scale a picture to the width that is shown, in as many colours as it needs."""
+    """Scale a picture to `WIDTH`, with 256 colours."""
     with Image.open(picture) as whole:
         small = whole.convert("RGB")
     small.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
-    # Of Pillow's methods the one that keeps a colour that only a mark has.
+    # Of Pillow's methods this one keeps colours of few pixels, such as the ring.
     plain = small.quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     plain.save(picture, optimize=True)
 
@@ -142,7 +142,7 @@ def main() -> None:
         parser.error(f"no picture is called {', '.join(sorted(unknown))}")
     for name in given.names or PICTURES:
         if PICTURES[name].shown == "web" and CHROMIUM is None:
-            print(f"{name}: left out, there is no Chromium")
+            print(f"{name}: left out, Chromium is not installed")
             continue
         make(name, given.to)
 

@@ -17,10 +17,6 @@ def layout(world: World, topics: Iterable[str]) -> str:
     """Return the layout for a run's export as JSON.
 
     A 3D panel hides topics until a layout, or a click for each, shows them.
-
-    Args:
-        world: The run's.
-        topics: All topics of the export.
     """
     shown: dict[str, dict[str, Any]] = {topic: {"visible": True} for topic in topics}
     if MAP_TOPIC in shown:

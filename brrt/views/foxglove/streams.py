@@ -47,11 +47,6 @@ class MarkerStreams:
 
     Places are rounded to float32, the precision of the viewers.
 
-    Args:
-        manifest: The run's.
-        world: The run's.
-        events: The log, from its first event on.
-
     Raises:
         LogError: The events contradict each other.
     """
@@ -141,9 +136,8 @@ class MarkerStreams:
     def _values(self, *, learns: bool) -> tuple[Ints, Ints, Floats, Floats]:
         """Return the values that cells get, in order: time, cell, configuration, value.
 
-        Args:
-            learns: Whether values are estimates of the cost-to-go, at first the distance; else
-                they are the first costs from the start.
+        They are estimates of the cost-to-go, at first the distance, if the planner learns; else
+        the first costs from the start.
         """
         expands, raised = self._events[Kind.EXPAND], self._events[Kind.HEURISTIC]
         goal = np.array(self._manifest.goal)

@@ -100,12 +100,7 @@ def draw_cost(
 
 
 def draw_time(axes: Sequence[Any], recording: Recording, name: str) -> None:
-    """Draw over iterations: the time of each, rejections in per cent, and events a second.
-
-    Args:
-        axes: Three axes that share their abscissa.
-        recording: The run.
-        name: Its name in messages.
+    """Draw over iterations, on three axes: time of each, rejections in per cent, events a second.
 
     Raises:
         BrrtError: It has no iterations.

@@ -42,10 +42,7 @@ def save_world(world: World, path: Path) -> None:
 def save_figure(figure: Any, path: Path, **how: Any) -> None:
     """Write a figure without a date, so that equal figures give equal files.
 
-    Args:
-        figure: The matplotlib figure.
-        path: The file; it appears once it is complete.
-        how: Other arguments of `savefig`.
+    The file appears once it is complete. `how` are other arguments of `savefig`.
 
     Raises:
         BrrtError: The file cannot be written.
@@ -58,14 +55,9 @@ def save_figure(figure: Any, path: Path, **how: Any) -> None:
 
 
 def plot_world(world: World, ax: Any = None) -> Any:
-    """Draw a world.
+    """Draw a world into axes, by default new ones; return them.
 
-    Args:
-        world: The world.
-        ax: Axes of matplotlib, with projection "3d" for a world in 3D; new ones by default.
-
-    Returns:
-        The axes.
+    The axes of a world in 3D have the projection "3d".
 
     Raises:
         BrrtError: matplotlib is missing, or the projection of the axes is not the world's.
@@ -109,7 +101,7 @@ def need_matplotlib() -> Any:
 
 
 def _draw_2d(world: World, ax: Any) -> None:
-    from matplotlib import collections as marks  # noqa: PLC0415
+    from matplotlib import collections as artists  # noqa: PLC0415
 
     dark = rgb(OBSTACLE)
     seam: dict[str, Any] = {"linewidths": _SEAM, "joinstyle": "miter"}
@@ -119,7 +111,7 @@ def _draw_2d(world: World, ax: Any) -> None:
     if len(world.balls):
         sizes = 2 * world.balls[:, 2]
         ax.add_collection(
-            marks.EllipseCollection(
+            artists.EllipseCollection(
                 sizes, sizes, np.zeros(len(sizes)), units="xy", offsets=world.balls[:, :2],
                 offset_transform=ax.transData, color=dark, **seam,
             )
@@ -127,11 +119,11 @@ def _draw_2d(world: World, ax: Any) -> None:
     corners = world.boxes[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 4, 2)
     areas = [*corners, *(polygon for polygon in world.polygons if len(polygon) > 2)]
     if areas:
-        ax.add_collection(marks.PolyCollection(areas, color=dark, **seam))
+        ax.add_collection(artists.PolyCollection(areas, color=dark, **seam))
     segments = [polygon for polygon in world.polygons if len(polygon) == 2]
     if segments:
         ax.add_collection(
-            marks.LineCollection(segments, color=dark, linewidths=1.2, capstyle="round")
+            artists.LineCollection(segments, color=dark, linewidths=1.2, capstyle="round")
         )
     _draw_ends(world, ax)
     ax.set(xlim=(x0, x1), ylim=(y1, y0) if world.y_down else (y0, y1), aspect="equal")

@@ -153,13 +153,7 @@ def height_of_tree(recording: Recording, width: float) -> float:
 
 
 def add_legend(part: Any, panel: TreePanel, artists: Sequence[Any]) -> None:
-    """Add a legend, and a colour scale for cells, below a tree.
-
-    Args:
-        part: The figure, or the part of one.
-        panel: The tree in it.
-        artists: What the legend names; see `TreePanel.legend`.
-    """
+    """Add a legend of artists, and a colour scale for cells, below a tree in a figure."""
     rows = -(-len(artists) // _LEGEND_COLUMNS)
     columns = -(-len(artists) // rows)
     legend = part.legend(

@@ -127,8 +127,10 @@ class Playback:
         moves = self._events[Kind.MOVE]
         moves = moves[: np.searchsorted(moves["seq"], seq, side="right")]
         start = self.robot.places(np.array([self._manifest.start]))
-        ways = np.split(self.robot.places(moves["q"]), np.flatnonzero(np.diff(moves["trial"])) + 1)
-        return [np.concatenate([start, way]) for way in ways if len(way)]
+        trials = np.split(
+            self.robot.places(moves["q"]), np.flatnonzero(np.diff(moves["trial"])) + 1
+        )
+        return [np.concatenate([start, trial]) for trial in trials if len(trial)]
 
     def rejects(self, seq: int, newest: int) -> Floats:
         """Return begin and end of the newest rejected extensions, shape (n, 2, dim)."""

@@ -34,11 +34,6 @@ _PIXELS = 640
 def show_world(world: World, *, path: Path | None = None, view: bool = False) -> None:
     """Write a world to an .rrd file, or show it in Rerun's viewer, or both.
 
-    Args:
-        world: The world.
-        path: The file; it is overwritten.
-        view: Show it in the open viewer, or in one that is opened for it.
-
     Raises:
         BrrtError: The file cannot be written, there is no viewer, or a coordinate is too large for
             single precision.
@@ -72,16 +67,14 @@ def _log_query(rec: rr.RecordingStream, world: World) -> None:
 
 
 def application(world: World, what: str) -> str:
-    """Return the name under which a viewer keeps a layout; it shows the last one of each name.
+    """Return the name under which a viewer keeps the layout for what is drawn in a world.
 
-    Args:
-        world: Its bounds are part of the layout.
-        what: What is drawn in it.
+    Drawings of one name share a layout, which has the bounds of the world.
     """
     size = " x ".join(f"{side:g}" for side in world.upper - world.lower)
     corner = ", ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
-    ways = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
-    return " ".join(["brrt", what, size, *ways])
+    details = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
+    return " ".join(["brrt", what, size, *details])
 
 
 def places(values: Any, robot: Robot) -> NDArray[np.float32]:
@@ -137,14 +130,7 @@ def world_view(
     below: str = "",
     name: str = "World",
 ) -> Any:
-    """Return a view of the whole world and what is drawn in it.
-
-    Args:
-        world: The world.
-        overrides: Components that the view sets, by entity.
-        below: The entity below which the world is drawn.
-        name: The view's title.
-    """
+    """Return a view of a world that is drawn below an entity, with components that it overrides."""
     options: dict[str, Any] = {
         "origin": "/",
         "contents": f"{below}/world/**",

@@ -70,11 +70,7 @@ def draw_into(
 class RunDrawing:
     """Draws the events of a run, batch by batch, into a Rerun recording stream.
 
-    Args:
-        rec: The stream.
-        manifest: The run's.
-        world: The run's.
-        title: Shown above the description of the run, in Markdown.
+    `title`, in Markdown, is shown above the description of the run.
     """
 
     def __init__(

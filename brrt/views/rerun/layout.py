@@ -101,10 +101,7 @@ def _numbers(values: tuple[float, ...]) -> str:
 def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Blueprint:
     """Return the layout of a run: the world, plots, the log and its description.
 
-    Args:
-        manifest: The run's.
-        world: The run's.
-        live: Follow new events instead of pausing at the start.
+    A live one follows new events, another one pauses at the start.
     """
     columns = rrb.TextLogColumns(timeline_columns=["iteration"], text_log_columns=["body"])
     log = rrb.TextLogView(origin="/log", name="Log", columns=columns)
@@ -120,11 +117,8 @@ def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Bl
 def framed(views: Any, *, executed: bool, live: bool = False) -> rrb.Blueprint:
     """Return a layout of views with a collapsed time panel and no other panels.
 
-    Args:
-        views: What is shown.
-        executed: Start on the timeline of events: all moves along a path that is executed after
-            planning belong to the last iteration.
-        live: Follow new events instead of pausing at the start.
+    A run that executes its path starts on the timeline of events, since all of those moves belong
+    to the last iteration.
     """
     return rrb.Blueprint(
         views,
@@ -163,13 +157,7 @@ def plots(*below: str) -> list[rrb.TimeSeriesView]:
 
 
 def world_view(world: World, *, below: str = "", name: str = "World") -> Any:
-    """Return the view of the world with a run in it; it sets what stays and for how long.
-
-    Args:
-        world: The world.
-        below: The entity below which the run is drawn.
-        name: The view's title.
-    """
+    """Return the view of a run that is drawn below an entity; it sets how long items are shown."""
     past = _ranges(*3 * [rrb.TimeRangeBoundary.infinite()])
     recent, rewired = _last(1), _last(_REWIRED)
     shown = {f"/world/tree/{name}": past for name in TREE_NAMES}

@@ -23,12 +23,7 @@ _LIGHTER = 0.12
 
 
 def draw_pair(path: Path, a: Recording, b: Recording) -> Difference | None:
-    """Draw two runs into an .rrd file for the viewer: below the entities `/A` and `/B`.
-
-    Args:
-        path: The file; it is overwritten.
-        a: The first run.
-        b: The second run.
+    """Draw two runs into an .rrd file for the viewer, below the entities `/A` and `/B`.
 
     Returns:
         The first event that differs in more than its time; None if there is none.
@@ -58,13 +53,7 @@ def draw_pair(path: Path, a: Recording, b: Recording) -> Difference | None:
 
 
 class _Below:
-    """A recording stream below an entity; its plots have shades of one colour.
-
-    Args:
-        rec: The stream.
-        letter: The entity, and the first word of the names of plots.
-        colour: Of the first line of each plot.
-    """
+    """A recording stream below the entity of a letter; its plots have shades of one colour."""
 
     def __init__(self, rec: rr.RecordingStream, letter: str, colour: Colour) -> None:
         self._rec, self._letter, self._colour = rec, letter, colour

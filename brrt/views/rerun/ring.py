@@ -32,8 +32,8 @@ def draw_ring(
     ]
     layer = {"draw_order": 110} if world.dim == 2 else {}
     strips: Any = rr.LineStrips2D if world.dim == 2 else rr.LineStrips3D
-    rec.log("/world/mark", strips(rings, colors=RING, radii=-2, **layer), static=True)
-    log_label(rec, world, "mark", place, RING, text, radius + 0.012)
+    rec.log("/world/ring", strips(rings, colors=RING, radii=-2, **layer), static=True)
+    log_label(rec, world, "ring", place, RING, text, radius + 0.012)
 
 
 def place_of(
@@ -41,11 +41,7 @@ def place_of(
 ) -> NDArray[np.float64]:
     """Return the configuration of an event, or else of the newest one before it that has one.
 
-    Args:
-        events: The run's log, at least up to the event.
-        manifest: The run's.
-        seq: The event's number.
-        other: The event of another run: of two paths, the first waypoint that differs is returned.
+    If it is a path and so is the `other` run's event, return the first waypoint that differs.
     """
     until = events.until(seq=seq)
     newest = {kind: table[-1] for kind, table in until.tables.items() if len(table)}

@@ -44,13 +44,8 @@ def rrd_file(
 ) -> Iterator[rr.RecordingStream]:
     """Collect what the body logs, and write it to an .rrd file at the end.
 
-    Rerun's own file writer may hang when a write fails, so the bytes pass through memory.
-
-    Args:
-        path: The file; it appears once it is complete, and replaces an older one.
-        name: See `new_stream`.
-        application: See `new_stream`.
-        layout: How a viewer shows it.
+    The file appears once it is complete, and replaces an older one. Rerun's own file writer may
+    hang when a write fails, so the bytes pass through memory.
 
     Raises:
         BrrtError: The file cannot be written.
@@ -72,11 +67,6 @@ def viewer_stream(
     name: str, application: str, layout: rrb.Blueprint
 ) -> Iterator[rr.RecordingStream]:
     """Show what the body logs in the open viewer, or in one that is opened for it.
-
-    Args:
-        name: See `new_stream`.
-        application: See `new_stream`.
-        layout: How the viewer shows it.
 
     Raises:
         RecordingError: There is no viewer.

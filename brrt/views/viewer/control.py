@@ -26,13 +26,9 @@ class Cursor(NamedTuple):
 
 
 def show(file: Path, cursor: Cursor | None) -> None:
-    """Open a file in a new window, which stays open when this process ends.
+    """Open an .rrd file in a new window, which stays open when this process ends.
 
-    The viewer keeps the file open: it may be deleted afterwards.
-
-    Args:
-        file: An .rrd file.
-        cursor: The instant; None takes that of the file.
+    Without a cursor, the file's layout chooses the instant. The file may be deleted afterwards.
 
     Raises:
         RecordingError: There is no viewer, or it rejects the file.
@@ -54,13 +50,7 @@ def screenshot(
     cursor: Cursor | None = None,
     size: tuple[int, int] = (1600, 1000),
 ) -> None:
-    """Write a picture of a file in the viewer as a PNG; no screen is needed.
-
-    Args:
-        file: An .rrd file.
-        picture: The PNG to write.
-        cursor: The instant; None takes that of the file.
-        size: Width and height in pixels.
+    """Write a picture of an .rrd file in the viewer as a PNG; no screen is needed.
 
     Raises:
         RecordingError: The viewer cannot run, or its picture does not come to rest.
@@ -94,13 +84,9 @@ def headless(size: tuple[int, int]) -> Iterator[ViewerClient]:
 def shoot(
     client: ViewerClient, file: Path, cursor: Cursor | None, view: str | None = None
 ) -> bytes:
-    """Return a picture of a file in the viewer, as a PNG, once it is at rest.
+    """Return a picture of an .rrd file in the viewer, as a PNG, once it is at rest.
 
-    Args:
-        client: The viewer.
-        file: An .rrd file; a viewer that has opened it before shows it again.
-        cursor: The instant; None takes that of the file.
-        view: Title of one view; None takes the whole window.
+    `view` is the title of one view; None takes the whole window.
 
     Raises:
         RecordingError: The picture does not come to rest.

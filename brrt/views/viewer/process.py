@@ -50,9 +50,6 @@ def program() -> str | None:
 class Program:
     """A process of the viewer that listens on this machine only.
 
-    Args:
-        options: Options of the executable.
-
     Raises:
         RecordingError: The viewer is not installed.
     """

@@ -14,10 +14,10 @@ _PAUSE_S = 0.1
 
 
 class Server:
-    """A web page with a drawing; it exists until `close`.
+    """A web page with an .rrd file, which exists until `close`.
 
     Args:
-        file: An .rrd file, which must not be deleted meanwhile.
+        file: The file; it must not be deleted meanwhile.
         port: Port of the page; None takes `PORT` if it is free, else another one.
 
     Attributes:

@@ -37,7 +37,7 @@ def test_example_notebook(
         if cell["cell_type"] == "code":
             exec(compile("".join(cell["source"]), "look_inside.ipynb", "exec"), names)  # noqa: S102
     out = capsys.readouterr().out
-    assert names["figures"]["path_cost"] <= names["figures"]["first_path_cost"]
+    assert names["result"]["path_cost"] <= names["result"]["first_path_cost"]
     assert "first path: cost" in out
     assert f"{len(names['rejected'])} rejections" in out
     recording = names["recording"]

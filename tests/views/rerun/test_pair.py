@@ -23,8 +23,8 @@ def test_two_runs_below_entities_of_their_own(tmp_path: Path) -> None:
         draw_run(tmp_path / "one.rrd", run)
         alone = {name for name in entities(tmp_path / "one.rrd") if name.startswith("/world")}
         mine = {name.removeprefix(f"/{letter}") for name in found if name.startswith(f"/{letter}/")}
-        assert {n for n in mine if "/mark" not in n and n.startswith("/world")} == alone
-        assert {"/world/mark", "/world/mark/label", "/run", "/log"} <= mine
+        assert {n for n in mine if "/ring" not in n and n.startswith("/world")} == alone
+        assert {"/world/ring", "/world/ring/label", "/run", "/log"} <= mine
     rest = {name for name in found if not name.startswith(("/A", "/B", "/__properties"))}
     assert rest == {"/difference"}
     for chunk in RrdReader(tmp_path / "pair.rrd").stream():
@@ -39,7 +39,7 @@ def test_equal_runs_have_no_ring(tmp_path: Path) -> None:
     runs = [read(record(tmp_path / f"{name}.mcap", seed=3)) for name in "ab"]
     assert draw_pair(tmp_path / "pair.rrd", *runs) is None
     assert not any(
-        "/mark" in name or "difference" in name for name in entities(tmp_path / "pair.rrd")
+        "/ring" in name or "difference" in name for name in entities(tmp_path / "pair.rrd")
     )
 
 

@@ -34,12 +34,7 @@ class CellsDrawing:
 
     A search that ends before the robot moves (A*) colours them by their cost, with lines to their
     parents. One that learns while the robot moves (LRTA*) colours them by their estimate of the
-    cost-to-go.
-
-    Args:
-        canvas: Where they are drawn.
-        nodes: Gets the cells, as tree 0, for other parts of the drawing.
-        manifest: The run's.
+    cost-to-go. `nodes` gets the cells, as tree 0, for other parts of the drawing.
     """
 
     def __init__(self, canvas: Canvas, nodes: dict[int, DrawnNodes], manifest: Manifest) -> None:

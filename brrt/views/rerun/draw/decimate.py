@@ -32,14 +32,9 @@ def one_in_stride(first: int, count: int) -> NDArray[np.int64]:
 class Decimation:
     """Keeps every item up to a number, and later ones only where they reach new cells of a grid.
 
-    Args:
-        world: The world that the grid covers.
-        full: The number; None takes `DRAWN_IN_FULL`.
-        cells: Cells of the grid, about; None takes `_CELLS`.
-
     Attributes:
         count: Items so far.
-        full: As given.
+        full: The number; None takes `DRAWN_IN_FULL`.
     """
 
     def __init__(self, world: World, full: int | None = None, cells: int | None = None) -> None:
@@ -74,13 +69,9 @@ class Decimation:
 class DrawnNodes:
     """The nodes of a tree, or the cells of a lattice, that have appeared so far.
 
-    Args:
-        world: The world that they are in.
-        decimation: Decides which of them are drawn; None takes the default.
-
     Attributes:
         drawn: Number of drawn nodes; each has a slot, numbered from 0.
-        decimation: As given.
+        decimation: Decides which nodes are drawn.
     """
 
     def __init__(self, world: World, decimation: Decimation | None = None) -> None:
@@ -96,15 +87,9 @@ class DrawnNodes:
     def add(
         self, nodes: NDArray[np.int32], places: NDArray[np.float32], wanted: NDArray[np.bool_]
     ) -> NDArray[np.int64]:
-        """Add new nodes.
+        """Add new nodes at places, shape (n, dim); `wanted` are those that may be drawn.
 
-        Args:
-            nodes: Their numbers, shape (n,).
-            places: Where they are, shape (n, dim).
-            wanted: Which of them may be drawn, shape (n,).
-
-        Returns:
-            Indices of those that are drawn; they have got the next slots.
+        Return the indices of those that are drawn; they get the next slots.
         """
         which = np.flatnonzero(wanted & self.decimation.keep(places))
         self._make_room(nodes)

@@ -1,4 +1,4 @@
-"""Drawings whose items change: items lie on pages, and a changed page is logged anew.
+"""Drawings whose items change: items lie on pages, and a changed page is logged again.
 
 Of an entity that changes, a viewer shows the newest row up to the cursor, so a page is right
 wherever the cursor goes. Three bounds keep the cost low:

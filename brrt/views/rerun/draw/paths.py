@@ -22,7 +22,7 @@ from brrt.views.rerun.layout import (
 )
 
 _LONGEST_SHOWN = 1000
-"""Waypoints up to which a path is drawn anew after each accepted shortcut."""
+"""Waypoints up to which a path is drawn again after each accepted shortcut."""
 
 _LEAST_GAIN = 1e-3
 """How much shorter an improved path must be than the drawn one, as a part of it, to be drawn; the

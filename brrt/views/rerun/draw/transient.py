@@ -19,9 +19,7 @@ _ROW = 16
 class TransientDrawing:
     """Draws items that the layout shows only until a certain age.
 
-    Args:
-        canvas: Where they are drawn.
-        nodes: Nodes of the trees, or the cells in place of tree 0.
+    `nodes` has the nodes of the trees, or the cells in place of tree 0.
     """
 
     def __init__(self, canvas: Canvas, nodes: Mapping[int, DrawnNodes]) -> None:

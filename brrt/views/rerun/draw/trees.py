@@ -16,13 +16,7 @@ from brrt.views.rerun.layout import LINK_ENTITY
 
 
 class TreesDrawing:
-    """Draws all trees of a run.
-
-    Args:
-        canvas: Where they are drawn.
-        nodes: Gets the nodes of each tree, for other parts of the drawing.
-        transient: Draws rewired edges.
-    """
+    """Draws all trees of a run; `nodes` gets the nodes of each, for other parts of the drawing."""
 
     def __init__(
         self, canvas: Canvas, nodes: dict[int, DrawnNodes], transient: TransientDrawing
