@@ -16,9 +16,9 @@ PICTURE = ROOT / "docs" / "architecture.svg"
 # Where each package is drawn: column and row, from the bottom up.
 FOUNDATION = {"events, errors, files, settings": (1.0, 0)}
 FOUNDATION |= {"worlds": (1.0, 1), "robots": (1.0, 2), "scenario": (1.0, 3), "recording": (1.0, 4)}
-PLANNING = {"kernels": (0.0, 4), "planners": (0.0, 5), "runs": (0.0, 8)}
-READING = {"formats": (2.0, 5), "replay": (1.5, 5), "verification": (1.6, 6)}
-READING |= {"comparison": (2.2, 6), "explanation": (1.6, 7), "views": (2.2, 8)}
+PLANNING = {"kernels": (0.0, 5), "planners": (0.0, 6), "runs": (0.4, 8)}
+READING = {"formats": (2.2, 5), "collision": (1.5, 5), "replay": (1.9, 6), "verification": (1.6, 7)}
+READING |= {"comparison": (2.3, 7), "explanation": (1.6, 8), "views": (2.3, 8)}
 TOP = {"testing": (0.7, 9), "cli": (1.4, 10)}
 COLOURS = ((FOUNDATION, "#dfe7ef"), (PLANNING, "#f6e3cf"), (READING, "#dcefdc"), (TOP, "#eee6f3"))
 PLACES = FOUNDATION | PLANNING | READING | TOP

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import Obstacles, first_hits
 from brrt.explanation.summary import RunSummary
 from brrt.robots import Robot
-from brrt.verification.collision.motions import Obstacles, first_hits
 from brrt.worlds.free_space import occupied
 from brrt.worlds.rasterize import Raster
 from brrt.worlds.world import World

@@ -8,8 +8,8 @@ import numpy as np
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import LATEST_NS, Events
+from brrt.formats.validate import check_possible
 from brrt.scenario.manifest import Manifest
-from brrt.validate import check_possible
 from brrt.worlds.world import World
 
 MOST_BYTES = 1 << 28

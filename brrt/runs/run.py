@@ -12,6 +12,7 @@ import numpy as np
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind
+from brrt.formats.validate import check_possible
 from brrt.kernels.event_log import EventLog
 from brrt.planners import PLANNERS, check_params, make_planner, make_stop, state_contract
 from brrt.planners.base.problem import Problem
@@ -23,7 +24,6 @@ from brrt.replay.metrics import Metrics
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
 from brrt.settings import Settings
-from brrt.validate import check_possible
 from brrt.worlds.world import World
 
 _SWITCH_S = 0.0005

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import Obstacles, first_hits
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.replay.cost_history import CostHistory
 from brrt.replay.tree_fold import (
@@ -23,7 +24,6 @@ from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contracts_of
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.query import Query
-from brrt.verification.collision.motions import Obstacles, first_hits
 from brrt.verification.result import RuleResult
 from brrt.verification.retention import Kept
 from brrt.verification.timeline import Scripts

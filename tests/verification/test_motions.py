@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from brrt.collision import obstacles as obstacles_module
+from brrt.collision.motions import Obstacles, all_clear, first_hits, near
 from brrt.robots import Point
-from brrt.verification.collision import obstacles as obstacles_module
-from brrt.verification.collision.motions import Obstacles, all_clear, first_hits, near
 from brrt.worlds import World
 from tests.robots.test_robots import BODIES, MAKERS, free, random_edges, random_world
 from tests.support import naive

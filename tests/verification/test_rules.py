@@ -512,7 +512,7 @@ def test_a_refusal_needs_a_reason(name: str, gap: float) -> None:
     centre = corner + out / np.hypot(*out) * (radius + gap * case.world.extent)
     alone = replace(case.world, balls=np.array([[*centre, radius]]))
     refused = np.array([[*q]])
-    from brrt.verification.collision.motions import Obstacles, all_clear, first_hits
+    from brrt.collision.motions import Obstacles, all_clear, first_hits
 
     assert all_clear(Obstacles(alone), robot, refused, refused).tolist() == [gap > 1e-5]
     assert first_hits(Obstacles(alone), robot, refused, refused).tolist() == [-1]

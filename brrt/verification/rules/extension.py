@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import towards
 from brrt.events import Kind, Reason, Source, Table
 from brrt.scenario.contract import Contract, Growth
-from brrt.verification.collision.motions import towards
 from brrt.verification.context import CLOSE, Context, TreeHistory, Windows
 from brrt.verification.neighbours import Neighbours, nearest
 from brrt.verification.result import RuleResult

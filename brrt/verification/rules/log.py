@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.bodies import endless
 from brrt.events import FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.replay.metrics import Metrics
-from brrt.verification.collision.bodies import endless
 from brrt.verification.context import CLOSE, Context, Windows, waypoints
 from brrt.verification.result import RuleResult
 

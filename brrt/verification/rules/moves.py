@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import towards
 from brrt.events import Kind, Phase, Status, Table
-from brrt.verification.collision.motions import towards
 from brrt.verification.context import CLOSE, Context
 from brrt.verification.result import RuleResult
 from brrt.verification.rules.log import text

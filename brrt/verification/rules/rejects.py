@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import all_clear
 from brrt.events import Kind, Reason, Stage, Table, table_dtype
 from brrt.scenario.contract import Contract
-from brrt.verification.collision.motions import all_clear
 from brrt.verification.context import CLOSE, Context, Windows
 from brrt.verification.result import RuleResult
 from brrt.verification.retention import Thinned

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import all_clear
 from brrt.events import Kind, Status, Table
 from brrt.scenario.contract import Lattice
-from brrt.verification.collision.motions import all_clear
 from brrt.verification.context import CLOSE, Context
 from brrt.verification.result import RuleResult
 from brrt.verification.rules.lattice import adjacent, indices, lattice_of

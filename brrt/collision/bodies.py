@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.obstacles import Obstacles, near
 from brrt.robots import Chain, Polygon
-from brrt.verification.collision.obstacles import Obstacles, near
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

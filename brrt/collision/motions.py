@@ -2,7 +2,7 @@
 
 A motion counts as blocked where it enters an obstacle by more than `DEPTH` of the lengths at
 hand. So rounding never blames a planner, and whatever really goes through something is found.
-Bodies are looked at in `brrt.verification.collision.bodies`.
+Bodies are looked at in `brrt.collision.bodies`.
 """
 
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.verification.collision.bodies import swept_clear, swept_hits, towards
-from brrt.verification.collision.obstacles import Obstacles, near
+from brrt.collision.bodies import swept_clear, swept_hits, towards
+from brrt.collision.obstacles import Obstacles, near
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrt.worlds.world import World
 
 if TYPE_CHECKING:
-    from brrt.verification.collision.bodies import Shapes
+    from brrt.collision.bodies import Shapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -55,7 +55,7 @@ class Obstacles:
     @cached_property
     def shapes(self) -> "Shapes":
         """All obstacles in the plane as convex shapes; balls are points with a radius."""
-        from brrt.verification.collision.bodies import shapes_of  # noqa: PLC0415 - stands above this file
+        from brrt.collision.bodies import shapes_of  # noqa: PLC0415 - stands above this file
 
         hulls = [_corners(box) for box in self.boxes] + list(self.balls[:, None, :2])
         radius = np.zeros(len(self))
