@@ -22,7 +22,7 @@ READING |= {"comparison": (2.3, 7), "explanation": (1.6, 8), "views": (2.3, 8)}
 TOP = {"testing": (0.7, 9), "cli": (1.4, 10)}
 COLOURS = ((FOUNDATION, "#dfe7ef"), (PLANNING, "#f6e3cf"), (READING, "#dcefdc"), (TOP, "#eee6f3"))
 PLACES = FOUNDATION | PLANNING | READING | TOP
-WIDTH, HEIGHT, BOX, ROW, COLUMN = 860, 640, (190, 34), 54, 290
+WIDTH, HEIGHT, BOX, ROW, COLUMN = 930, 640, (190, 34), 54, 290
 
 
 def package_of(module: str) -> str | None:
