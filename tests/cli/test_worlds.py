@@ -364,7 +364,7 @@ def test_names_are_printed_as_they_are(brrt: Command) -> None:
     done = brrt("worlds", "make", "circles2d", "--out", f"{name}.json")
     assert done.out.count(f"{name}.json") == 2
     done = brrt("worlds", "show", f"{name}.json", "--out", f"{name}.png", "--rrd", f"{name}.rrd")
-    assert f"{name}.png: a picture of it" in done.out
+    assert f"{name}.png: the picture" in done.out
     assert done.out.count(f"{name}.rrd") == 2
 
 
