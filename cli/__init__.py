@@ -1,4 +1,4 @@
-"""What people use brrt by: the `brrt` command, and the plugin for pytest; installed as `brrt_cli`.
+"""The `brrt` command and the plugin for pytest; installed as `brrt_cli`.
 
 PYTEST_DONT_REWRITE: see `brrt`.
 """

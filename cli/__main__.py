@@ -1,4 +1,4 @@
-"""`python -m brrt_cli` does what `brrt` does."""
+"""`python -m brrt_cli` is `brrt`."""
 
 from .app import main
 

@@ -10,17 +10,17 @@ Run = Annotated[Path, typer.Argument(help="A recording, .mcap or .rrd.")]
 At = Annotated[
     str | None,
     typer.Option(
-        help="Show the run at this time since its start, such as 1.5s, 20ms or 300us.",
+        help="The run after this time, such as 1.5s, 20ms or 300us.",
         metavar="TIME",
         rich_help_panel="Instant",
     ),
 ]
 AtEvent = Annotated[
     int | None,
-    typer.Option(help="Show the run after the event of this number.", rich_help_panel="Instant"),
+    typer.Option(help="The run after the event of this number.", rich_help_panel="Instant"),
 ]
 AtIteration = Annotated[
-    int | None, typer.Option(help="Show the run after this iteration.", rich_help_panel="Instant")
+    int | None, typer.Option(help="The run after this iteration.", rich_help_panel="Instant")
 ]
 Partial = Annotated[
     bool,

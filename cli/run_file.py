@@ -77,11 +77,10 @@ def fault(error: BrokenError, count: int, last: Instant) -> str:
 
 
 def refusal(error: BrokenError, count: int, last: Instant) -> str:
-    """Describe what is wrong with a file, and how to take or save the rest of it."""
-    save = f"save them with brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
-    if not count:
-        save = save.replace("them", "the problem", 1)
-    return f"{fault(error, count, last)}: accept that with --partial, or {save}"
+    """Describe what is wrong with a file, and how to use or save the rest of it."""
+    remedy = f"brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
+    rest = "them" if count else "the problem"
+    return f"{fault(error, count, last)}: use {rest} with --partial, or save {rest} with {remedy}"
 
 
 def events_left(events: int, until_s: float, *, complete: bool) -> str:

@@ -1,0 +1,113 @@
+"""`brrt`: help, options, wrong usage, and what a command imports."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import Result
+
+Command = Callable[..., Result]
+COMMANDS = "plan replay plot verify diff explain export view recover planners robots worlds".split()
+
+
+def imported(*args: str) -> set[str]:
+    """Run the command in a process of its own; return the top-level packages that it imports."""
+    code = (
+        "import sys, brrt_cli.app\n"
+        "try: brrt_cli.app.main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "print('\\n' + ' '.join({name.partition('.')[0] for name in sys.modules}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *args], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_help_lists_all_commands(brrt: Command) -> None:
+    """In their order, each with its first sentence, within 80 columns."""
+    done = brrt("--help")
+    assert done.code == 0
+    assert "brrt replay run.mcap" in done.out
+    listed = done.out.partition(" Commands ")[2]
+    starts = [listed.index(f"│ {name} ") for name in COMMANDS]
+    assert starts == sorted(starts)
+    assert "Run a planner in a world and record every event." in listed
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, "worlds list", "worlds show", "worlds make"])
+def test_help_of_a_command(
+    name: str, brrt: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Examples keep their lines at 80 columns."""
+    monkeypatch.setenv("COLUMNS", "80")
+    done = brrt(*name.split(), "-h")
+    assert (done.code, done.err) == (0, "")
+    lines = [line.strip() for line in done.out.splitlines()]
+    assert max(map(len, lines)) <= 80
+    if "Examples:" in lines:
+        first = lines.index("Examples:") + 1
+        examples = lines[first : lines.index("", first)]
+        assert examples
+        assert all(line.startswith(f"brrt {name.split()[0]}") for line in examples)
+
+
+def test_completion_knows_the_commands(brrt: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shell that asks for names beginning with "re" gets them with their help."""
+    monkeypatch.setenv("_BRRT_COMPLETE", "complete_zsh")
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "brrt re")
+    done = brrt()
+    assert "replay" in done.out
+    assert "recover" in done.out
+    assert "plan" not in done.out.replace("replay", "")
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["rplay"], "No such command 'rplay'. Did you mean 'replay'"),
+        (["plan", "--sed", "1"], "No such option: --sed"),
+        (["plan", "--seed", "x"], "'--seed': 'x' is not a whole number."),
+        (["plan", "--iterations", "1.5"], "'--iterations': '1.5' is not a whole number."),
+        (["plan", "--iterations", "1e999"], "'1e999' is not a whole number."),
+        (["plan", "--time", "soon"], "'--time': 'soon' is not a number."),
+        (["plot", "a.mcap", "--out", "a.png", "--dpi", "5"], "5 is not between 30 and 1200."),
+        (["plot", "a.mcap"], "Missing option '--out'"),
+        (["replay"], "Missing argument 'run'"),
+    ],
+)
+def test_wrong_usage_is_one_line(args: list[str], message: str, brrt: Command) -> None:
+    """Exit code 2, and one line on stderr that names the option."""
+    done = brrt(*args)
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert message in done.err
+    assert done.err.endswith("(see brrt --help)\n")
+
+
+def test_help_is_fast() -> None:
+    """The list of commands imports none of the heavy packages, nor do their help pages."""
+    heavy = {"mcap", "numba", "numpy", "pyarrow", "rerun"}
+    assert not imported("--help") & heavy
+    assert not imported("replay", "--help") & heavy
+
+
+def test_values_are_converted_without_pydantic() -> None:
+    """typer would import it for each command with an option that is not a flag."""
+    assert not imported("replay", "none.mcap", "--at-event", "3") & {"pydantic"}
+
+
+def test_no_colours_off_a_terminal(shell: Command) -> None:
+    """Output that goes to a file or a pipe holds no escape codes."""
+    done = shell("robots")
+    assert done.code == 0
+    assert "\x1b" not in done.out + done.err
+
+
+def test_only_drawing_imports_rerun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither planning nor replaying an .mcap does."""
+    monkeypatch.chdir(tmp_path)
+    assert "rerun" not in imported("plan", "--out", "a.mcap")
+    assert "rerun" not in imported("replay", "a.mcap")
