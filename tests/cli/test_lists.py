@@ -27,5 +27,3 @@ def test_lists_show_one_alone(name: str, brrt: Command) -> None:
     wrong = brrt(*name.split(), one + "x")
     assert wrong.code == 2
     assert f"did you mean {one!r}?" in wrong.err
-
-

@@ -173,7 +173,9 @@ def test_cache_folder(tmp_path: Path) -> None:
     )
     assert where.stdout.strip() == "None"
     plan = [sys.executable, "-m", "brrt_cli", "plan", "--no-record", "--start", "-1,5"]
-    refused = subprocess.run(plan, capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
+    refused = subprocess.run(
+        plan, capture_output=True, text=True, check=False, env=env, cwd=tmp_path
+    )
     assert "again in each run" in refused.stderr
     assert "BRRT_CACHE_DIR" in refused.stderr
     assert "once" not in refused.stderr

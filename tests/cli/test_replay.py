@@ -13,10 +13,10 @@ CONTRACT = (
     "path_cost path smoothed_cost smoothed_path plan_time_s smooth_time_s moves max_move_time_s "
     "deadline_misses"
 ).split()
-RUNS = (
+RUNS: tuple[list[str], ...] = (
     [],
     ["--planner", "rrt-star", "--iterations", "300"],
-    ["--planner", "rrt-connect", "--world", "empty2d", "--execute", "--deadline", "0.001"],
+    ["--planner", "rrt-connect", "--execute", "--deadline", "0.001"],
     ["--planner", "lrta-star", "--world", "circles2d:n=10"],
     ["--iterations", "20"],
 )
