@@ -1,7 +1,7 @@
 """`brrt recover`: a whole file out of one that was cut or damaged."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,6 +9,10 @@ from brrt.replay.text import counted
 
 from .console import Code, print_line
 from .options import Force
+
+if TYPE_CHECKING:
+    from brrt.scenario.manifest import Manifest
+    from brrt.worlds.world import World
 
 
 def recover(
@@ -38,7 +42,7 @@ def recover(
     from .output_file import check_output
 
     check_output(whole, "--out", (".mcap", ".rrd"), force=force)
-    found = recover(cut, whole)
+    found = recover(cut, whole, _open_sink)
     events = f"{counted(found.events, 'event')} up to {found.until_s:.6f} s"
     if found.lost is None:
         text = f"{cut} is whole: {whole} holds its {events}"
@@ -51,3 +55,14 @@ def recover(
     print_line(text)
     if not (found.events or found.complete):
         raise typer.Exit(Code.FAILED)
+
+
+def _open_sink(path: Path, manifest: "Manifest", world: "World") -> Any:
+    """Open a sink by the suffix of the file's name."""
+    if path.suffix == ".rrd":
+        from brrt.views.rerun.sink import RerunSink
+
+        return RerunSink(manifest, world, path=path)
+    from brrt.formats import McapSink
+
+    return McapSink(path, manifest, world)

@@ -1,5 +1,6 @@
 """Write the events that precede a cut or damage into a new, whole file."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from brrt.formats.integrity import BrokenError
 from brrt.formats.mcap.sink import McapSink
 from brrt.recording import Recording
 from brrt.replay.metrics import Metrics
+from brrt.scenario.manifest import Manifest
+from brrt.worlds.world import World
 
 NOTE = "brrt.recovered"
 """Name of the texts in which a recovered file names its origin."""
@@ -35,7 +38,11 @@ class Recovery:
     ended: bool
 
 
-def recover(cut: Path | str, whole: Path | str) -> Recovery:
+def recover(
+    cut: Path | str,
+    whole: Path | str,
+    open_sink: Callable[[Path, Manifest, World], Any] = McapSink,
+) -> Recovery:
     """Write the events that precede a cut or the first damage into a new, whole file.
 
     Index, statistics and checksums are made anew. The run's result is computed and written if the
@@ -43,7 +50,8 @@ def recover(cut: Path | str, whole: Path | str) -> Recovery:
 
     Args:
         cut: The recording: an .mcap file in any state, or an .rrd file that is whole.
-        whole: The new file, .mcap or .rrd; it appears once it is complete.
+        whole: The new file; it appears once it is complete.
+        open_sink: Opens the sink that writes it.
 
     Raises:
         RecordingError: The recording cannot be read, or is cut or damaged before its first event.
@@ -55,15 +63,16 @@ def recover(cut: Path | str, whole: Path | str) -> Recovery:
     recording = read(cut)
     with replacing(whole) as unfinished:
         try:
-            return _rewrite(cut, recording, unfinished)
+            sink = open_sink(unfinished, recording.manifest, recording.world)
+            return _rewrite(cut, recording, sink)
         except WriteError as error:
             why = f"{error.reason}; nothing of it is left: name a file where there is more room"
             raise WriteError(whole, why) from None
 
 
-def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
-    """Write what can be read of a recording to a path."""
-    sink, metrics = _sink(path, recording), Metrics(recording.manifest)
+def _rewrite(cut: Path, recording: Recording, sink: Any) -> Recovery:
+    """Write what can be read of a recording to a sink, and close it."""
+    metrics = Metrics(recording.manifest)
     try:
         recovery = _copy(recording, sink, metrics)
         if recovery.lost is not None:
@@ -73,14 +82,6 @@ def _rewrite(cut: Path, recording: Recording, path: Path) -> Recovery:
         raise
     sink.close(metrics.as_dict() if recovery.ended else None)
     return recovery
-
-
-def _sink(path: Path, recording: Recording) -> Any:
-    if path.suffix == ".rrd":
-        from brrt.views.rerun.sink import RerunSink  # noqa: PLC0415 - imports rerun
-
-        return RerunSink(recording.manifest, recording.world, path=path)
-    return McapSink(path, recording.manifest, recording.world)
 
 
 def _copy(recording: Recording, sink: Any, metrics: Metrics) -> Recovery:

@@ -16,6 +16,7 @@ from tests.support.files import (
     files_limited_to,
     flipped,
     mcap_records,
+    new_sink,
     saved,
     write,
 )
@@ -47,7 +48,7 @@ def test_recover(suffix: str, log: Events, tmp_path: Path) -> None:
     for size in (len(data) * 2 // 5, len(data) - 60):
         cut.write_bytes(data[:size])
         expected, _ = saved(cut)
-        found = recover(cut, whole)
+        found = recover(cut, whole, new_sink)
         events, error = saved(whole)
         assert error is None
         assert begins(log, events)

@@ -9,24 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from brrt import Events, McapSink, RecordingError, Run, read
+from brrt import Events, Manifest, McapSink, RecordingError, Run, World, read
 from tests.conftest import result_of
 
 FORMATS = (".mcap", ".rrd")
 
 
-def new_sink(path: Path, run: Run) -> Any:
+def new_sink(path: Path, manifest: Manifest, world: World) -> Any:
     """Open a sink by the suffix of the name."""
     if path.suffix == ".rrd":
         from brrt.views.rerun.sink import RerunSink
 
-        return RerunSink(run.manifest, run.problem.world, path=path)
-    return McapSink(path, run.manifest, run.problem.world)
+        return RerunSink(manifest, world, path=path)
+    return McapSink(path, manifest, world)
 
 
 def write(path: Path, run: Run, *batches: Events) -> None:
     """Write batches to a file, then the result that follows from them."""
-    sink = new_sink(path, run)
+    sink = new_sink(path, run.manifest, run.problem.world)
     try:
         for batch in batches:
             sink.write(batch)
