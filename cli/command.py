@@ -64,9 +64,9 @@ def _plain(params: list[Any]) -> list[Any]:
     return params
 
 
-def _one_line_paragraphs(text: str) -> str:
-    """Join the lines of each paragraph, since typer keeps their breaks; lists stay as they are."""
-    return re.sub(r"(?<=\S)\n(?=\S)", " ", text)
+def _reflowed(text: str) -> str:
+    """Join the lines of each paragraph, since typer keeps their breaks, but not indented lines."""
+    return re.sub(r"\n +", "\n", re.sub(r"(?<=\S)\n(?=\S)", " ", text))
 
 
 class Command(TyperCommand):
@@ -74,7 +74,7 @@ class Command(TyperCommand):
 
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
-        self.help = _one_line_paragraphs(self.help or "")
+        self.help = _reflowed(self.help or "")
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, which convert their values as said above."""
@@ -96,7 +96,7 @@ class Group(TyperGroup):
 
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
-        self.help = _one_line_paragraphs(self.help or "")
+        self.help = _reflowed(self.help or "")
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, which convert their values as said above."""
