@@ -40,8 +40,9 @@ from brrt.scenario.manifest import Manifest as Manifest
 from brrt.scenario.scenario import Scenario as Scenario
 from brrt.testing.gate import Verdict as Verdict
 from brrt.testing.gate import gate as gate
-from brrt.verification import Finding as Finding
-from brrt.verification import check as check
+from brrt.verification.result import Finding as Finding
+from brrt.verification.verification import Verification as Verification
+from brrt.verification.verification import verify as verify
 from brrt.views.matplotlib.figure import plot as plot
 from brrt.views.rerun.notebook import show as show
 from brrt.worlds import GENERATORS as GENERATORS

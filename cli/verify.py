@@ -1,7 +1,7 @@
 """`brrt verify`: whether a recording keeps what its planner promises."""
 
 import shlex
-from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,10 +13,10 @@ from .options import Json, Run
 from .progress import ProgressBar
 
 if TYPE_CHECKING:
-    from brrt.events import Events
     from brrt.recording import Recording
     from brrt.runs.reproduce import Reproduction
-    from brrt.verification import RuleResult
+    from brrt.verification.result import RuleResult
+    from brrt.verification.verification import Verification
 
 _SHOWN = 3
 _WIDTH = 80
@@ -29,34 +29,32 @@ def verify(
         bool,
         typer.Option(
             "--partial",
-            help="Judge what is whole of a cut or damaged file; what is promised of a run's end "
-            "is left out.",
+            help="Judge a cut or damaged file up to the fault; the run's end is not judged.",
         ),
     ] = False,
     rerun: Annotated[
         bool,
         typer.Option(
             "--rerun",
-            help="Plan the run again as well, from what the recording says of it, and compare "
-            "event by event.",
+            help="Also plan the run again, by the recorded scenario, and compare event by event.",
         ),
     ] = False,
     tolerance: Annotated[
         float | None,
         typer.Option(
-            help="With --rerun: how far apart numbers may be, relative to the greater one, and "
-            "to 1 below that. Default 1e-9; 0 wants every bit.",
+            help="With --rerun: by how much numbers may differ, relative to the greater one, or "
+            "to 1 if both are less. Default 1e-9; 0 compares every bit.",
         ),
     ] = None,
     long: Annotated[
-        bool, typer.Option("--long", help="Write each promise out in full, below its rule.")
+        bool, typer.Option("--long", help="Print each promise in full, below its rule.")
     ] = False,
 ) -> None:
-    """Hold a recording to what its planner promises, by code that is not the planner's.
+    """Check whether a recording keeps what its planner promises.
 
-    Exit code 0: every promise is kept; 1: one is broken. Whether draws are as
-    even and as biased as stated is judged by tests that wrong one sound
-    recording in a million at most.
+    The rules share no code with the planners. Exit code 0: all rules hold; 1:
+    one is broken. Tests of whether draws are uniform, and as biased as stated,
+    falsely accuse at most one recording in a million.
 
     brrt verify run.mcap
 
@@ -65,78 +63,56 @@ def verify(
     brrt verify run.mcap --rerun
     """
     from brrt.errors import BrrtError
-    from brrt.scenario.contracts import contracts_of
+    from brrt.verification.verification import verify
 
     from .run_file import open_run
 
     if tolerance is not None and (not rerun or not tolerance >= 0):
-        raise BrrtError("--tolerance must be a number from 0 on, and goes with --rerun alone")
+        raise BrrtError("--tolerance must be a number from 0 on, and needs --rerun")
     recording = open_run(run, partial=partial)
-    planner = recording.manifest.scenario.planner
-    results, events, cut = _examine(recording, partial=partial)
-    broken = sum(result.broken for result in results)
-    known = contracts_of(recording.manifest, recording.world)[-1] is not None
+    if partial and _lacks_events(recording):
+        recording = replace(recording, result=None)
+    found = verify(recording)
     again = _reproduced(recording, tolerance) if rerun else None
     _note_differences(recording)
     if as_json:
         print_json(
             {
-                "holds": not broken,
-                "planner_known": known,
-                "cut": cut,
-                "events": events,
-                "rules": _json(run, results),
+                "holds": found.holds,
+                "planner_known": found.has_contract,
+                "cut": found.is_cut,
+                "events": found.events,
+                "rules": [_json(run, result) for result in found.results],
+                "not_judged": found.not_judged,
                 **({} if again is None else {"rerun": again.as_dict()}),
             }
         )
     else:
-        if cut:
-            note(f"{run} breaks off; what is promised of a run's end was left out")
-        if not known:
-            note(
-                f"planner {planner} is not registered and the recording states no contract; only "
-                "what all planners promise was checked"
-            )
-        _show(run, results, long=long)
+        if found.is_cut:
+            note(f"{run} lacks the run's end, which is not judged")
+        _show(run, found, long=long)
         if again is not None:
             _show_again(again)
-    if broken or (again is not None and not again.equal):
+    if not found.holds or (again is not None and not again.equal):
         raise typer.Exit(Code.FAILED)
+
+
+def _lacks_events(recording: "Recording") -> bool:
+    """Whether fewer events can be read than the metrics at the end state."""
+    stated = (recording.result or {}).get("events", 0)
+    return sum(map(len, recording.batches())) < stated
 
 
 def _note_differences(recording: "Recording") -> None:
     """Note where another version's planner stated another contract; no rule judges that."""
     from brrt.scenario.contracts import contract_differences
-    from brrt.verification.rules.contracts import same_version
+    from brrt.verification.rules.log import same_version
 
     manifest = recording.manifest
     if not same_version(manifest):
         made_by = manifest.made_by.get("brrt", "of unknown version")
         for difference in contract_differences(manifest, recording.world) or ():
             note(f"the contract is that of brrt {made_by}: {difference}")
-
-
-def _examine(recording: "Recording", *, partial: bool) -> "tuple[list[RuleResult], int, bool]":
-    """Return what each rule found, the number of events, and whether the run's end is missing."""
-    from brrt.verification import examine
-
-    count = 0
-
-    def batches() -> "Iterator[Events]":
-        nonlocal count
-        for batch in recording.batches():
-            count += len(batch)
-            yield batch
-
-    def is_cut() -> bool:
-        if recording.result is None:  # as in a file that brrt recover made, though it is whole
-            return True
-        return partial and count < recording.result["events"]
-
-    results = examine(
-        recording.manifest, recording.world, batches(), cut=is_cut, figures=recording.result
-    )
-    return results, count, is_cut()
 
 
 def _reproduced(recording: "Recording", tolerance: float | None) -> "Reproduction":
@@ -150,9 +126,7 @@ def _reproduced(recording: "Recording", tolerance: float | None) -> "Reproductio
     announce_compilation()
     with ProgressBar(None, "preparing the planner").running() as bar:
         return reproduce(
-            recording,
-            tolerance=TOLERANCE if tolerance is None else tolerance,
-            watch=watch,
+            recording, tolerance=TOLERANCE if tolerance is None else tolerance, watch=watch
         )
 
 
@@ -160,76 +134,71 @@ def _show_again(again: "Reproduction") -> None:
     """Print what differs, and in the last line, or the only one, whether the events are equal."""
     *details, verdict = again.lines()
     print_lines(details)
-    style = "bold green" if again.equal else ""
-    print_line(verdict, style=style)
+    print_line(verdict, style="bold green" if again.equal else "")
 
 
-def _look(run: Path, seq: int) -> str:
-    """Say how to look at an event; at the log as a whole, how to look at its end."""
+def _view(run: Path, seq: int) -> str:
+    """Return the command that shows an event; for the recording as a whole, its end."""
     at = ["--at-event", str(seq)] if seq >= 0 else []
     return shlex.join(["brrt", "view", str(run), *at])
 
 
-def _json(run: Path, results: "list[RuleResult]") -> list[dict[str, Any]]:
-    return [
-        {
-            "rule": result.rule,
-            "promise": result.promise,
-            "examined": result.examined,
-            "broken": result.broken,
-            "findings": [
-                {
-                    "seq": found.seq,
-                    "t": found.t,
-                    "message": found.message,
-                    "view": _look(run, found.seq),
-                }
-                for found in result.findings
-            ],
-        }
-        for result in results
+def _json(run: Path, result: "RuleResult") -> dict[str, Any]:
+    findings = [
+        {"seq": each.seq, "t": each.t, "message": each.message, "view": _view(run, each.seq)}
+        for each in result.findings
     ]
+    return {**asdict(result), "findings": findings}
 
 
-def _show(run: Path, results: "list[RuleResult]", *, long: bool) -> None:
-    """Print a line a rule that had anything to look at, broken ones first with what they found."""
-    looked = sorted((t for t in results if t.examined), key=lambda result: not result.broken)
-    name = max((len(result.rule) for result in looked), default=0)
-    count = max((len(f"{result.examined:,}") for result in looked), default=0)
-    for result in looked:
+def _show(run: Path, found: "Verification", *, long: bool) -> None:
+    """Print a line for each rule that had something to judge, broken ones first."""
+    judged = sorted((r for r in found.results if r.examined), key=lambda result: not result.broken)
+    name = max((len(result.rule) for result in judged), default=0)
+    count = max((len(f"{result.examined:,}") for result in judged), default=0)
+    for result in judged:
         times = "once" if result.broken == 1 else f"{result.broken:,} times"
         verdict = f"BROKEN {times}" if result.broken else "holds"
         line = f"{result.rule:{name}}  {result.examined:>{count},}  {verdict:6}"
         promise = "" if long or result.broken else _short(result.promise, _WIDTH - len(line) - 2)
-        print_line(f"{line}  {promise}".rstrip(), style=_style(result))
+        print_line(f"{line}  {promise}".rstrip(), style="bold red" if result.broken else "")
         if long or result.broken:
-            _tell(result.promise, style="dim")
-        for found in result.findings[:_SHOWN]:
-            where = "log" if found.seq < 0 else f"event {found.seq:,} at {found.t / 1e9:.6f} s"
-            _tell(f"{where}: {found.message}")
-        if result.broken > _SHOWN:
-            print_line(f"  ... and {result.broken - _SHOWN:,} more")
-        if result.findings:
-            first = _look(run, result.findings[0].seq)
-            print_line(f"  look: {first}")
-    broken = sum(bool(result.broken) for result in looked)
-    total = f"{len(looked)} rules, {broken} broken" if broken else f"all {len(looked)} rules hold"
-    print_line(total, style="bold red" if broken else "bold green")
+            _print_wrapped(result.promise, style="dim")
+        _show_findings(run, result)
+    for reason, names in found.not_judged.items():
+        _print_wrapped(f"not judged, {reason}: {', '.join(names)}", indent="")
+    broken = sum(bool(result.broken) for result in judged)
+    print_line(_total(len(judged), broken, found), style="bold red" if broken else "bold green")
 
 
-def _tell(text: str, style: str = "") -> None:
-    """Print a sentence below its rule, no wider than a terminal."""
-    whole = TextWrapper(_WIDTH, "  ", "    ", break_long_words=False, break_on_hyphens=False)
-    for line in whole.wrap(text):
+def _total(judged: int, broken: int, found: "Verification") -> str:
+    if found.not_judged:
+        rest = sum(map(len, found.not_judged.values()))
+        return f"{judged - broken} rules hold, {broken} broken, {rest} could not be judged"
+    return f"{judged} rules, {broken} broken" if broken else f"all {judged} rules hold"
+
+
+def _show_findings(run: Path, result: "RuleResult") -> None:
+    for finding in result.findings[:_SHOWN]:
+        event = f"event {finding.seq:,} at {finding.t / 1e9:.6f} s"
+        _print_wrapped(f"{event if finding.seq >= 0 else 'log'}: {finding.message}")
+    if result.broken > _SHOWN:
+        print_line(f"  ... and {result.broken - _SHOWN:,} more")
+    if result.findings:
+        print_line(f"  view: {_view(run, result.findings[0].seq)}")
+
+
+def _print_wrapped(text: str, *, indent: str = "  ", style: str = "") -> None:
+    """Print a sentence, no wider than a terminal."""
+    wrapper = TextWrapper(
+        _WIDTH, indent, f"{indent}  ", break_long_words=False, break_on_hyphens=False
+    )
+    for line in wrapper.wrap(text):
         print_line(line, style=style)
-
-
-def _style(result: "RuleResult") -> str:
-    return "bold red" if result.broken else ""
 
 
 def _short(promise: str, room: int) -> str:
     """Cut a promise at a word, so that its line is no longer than a terminal."""
     if len(promise) <= room:
         return promise
-    return promise[: room - 3].rpartition(" ")[0].rstrip(",;:") + " ..."
+    return promise[: room - 3].rpartition(" ")[0].rstrip(",;:. ") + " ..."

@@ -45,7 +45,7 @@ def swept_clear(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> NDArr
     return (hit < 0) & ~open_
 
 
-def endless(robot: Any, dof: int) -> NDArray[np.bool_]:
+def wrapping_angles(robot: Any, dof: int) -> NDArray[np.bool_]:
     """Which numbers of a configuration are angles that wrap: a full turn leads back, shape (n,)."""
     if not hasattr(robot, "canonical"):
         return np.zeros(dof, bool)
@@ -56,7 +56,7 @@ def endless(robot: Any, dof: int) -> NDArray[np.bool_]:
 
 def towards(robot: Any, a: Floats, b: Floats) -> Floats:
     """Differences b - a, shape (n, dof), the short way round where an angle wraps."""
-    step, wraps = b - a, endless(robot, a.shape[1])
+    step, wraps = b - a, wrapping_angles(robot, a.shape[1])
     step[:, wraps] -= 2 * np.pi * np.round(step[:, wraps] / (2 * np.pi))
     return np.asarray(step)
 

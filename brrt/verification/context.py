@@ -1,290 +1,164 @@
-"""What rules look at."""
+"""What rules know of a recording."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.collision.motions import Obstacles, first_hits
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
-from brrt.replay.cost_history import CostHistory
-from brrt.replay.tree_fold import (
-    VALID,
-    CostFold,
-    Distance,
-    TreeChanges,
-    fold_costs,
-    of_tree,
-    trees_in,
-)
+from brrt.recording import Recording
+from brrt.replay.tree_fold import trees_in
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contracts_of
-from brrt.scenario.manifest import Manifest
 from brrt.scenario.query import Query
-from brrt.verification.result import RuleResult
-from brrt.verification.retention import Kept
-from brrt.verification.timeline import Scripts
-from brrt.worlds.world import World
+from brrt.collision.motions import Obstacles, first_hits
+from brrt.verification.draws import DrawHistory, Drawn
+from brrt.verification.retention import KeptEvents
+from brrt.verification.timeline import Timeline
+from brrt.verification.tolerances import CLOSE, ROUNDING
+from brrt.verification.tree_history import TreeHistory
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-CLOSE = 1e-9
-"""Part of a length by which figures may differ from it; rounding stays far below."""
-
-ROUNDING = 1e-14
-"""The same, as a part of the coordinates: a short motion far from the origin is rounded most."""
-
-_AT_ONCE = 1 << 18
-
-Windows = Generator[None, Events | None]
-"""A rule that looks at events as they are read: it is sent window after window, then None."""
+Flags = NDArray[np.bool_]
 
 
 def waypoints(event: Any, dof: int) -> Floats:
-    """A path's configurations, shape (n, dof)."""
+    """Return the configurations of a path event, shape (n, dof)."""
     return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
 
 
-@dataclass(frozen=True, eq=False)
-class TreeHistory:
-    """All that happens to one tree.
-
-    Attributes:
-        number: The tree's.
-        edges: Its edges; node n is the n-th.
-        rewires: Its rewires.
-        changes: Both, in order.
-        length: Length of the edge that each change makes, nan for roots, shape (m,).
-        fold: What a fold finds of each change.
-    """
-
-    number: int
-    edges: Table
-    rewires: Table
-    changes: TreeChanges
-    length: Floats
-    fold: CostFold
-
-    @classmethod
-    def of(cls, number: int, events: Events, distance: Distance) -> Self:
-        """Fold the tree of a number."""
-        edges, rewires = (of_tree(events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
-        changes = TreeChanges.of(edges, rewires)
-        length = changes.lengths(np.asarray(edges["q"]), distance)
-        return cls(number, edges, rewires, changes, length, fold_costs(changes, length))
-
-    def of_edges(self, column: NDArray[Any]) -> NDArray[Any]:
-        """The part of a column of changes that belongs to the edges."""
-        return column[self.changes.joins] if len(self.rewires) else column
-
-    def of_rewires(self, column: NDArray[Any]) -> NDArray[Any]:
-        """The part that belongs to the rewires."""
-        return column[~self.changes.joins] if len(self.rewires) else column[:0]
-
-    def spans(self) -> Iterator[slice]:
-        """Yield the edges in parts: of millions not all can be looked at at once."""
-        for first in range(0, len(self.edges), _AT_ONCE):
-            yield slice(first, min(first + _AT_ONCE, len(self.edges)))
-
-    @cached_property
-    def _history(self) -> CostHistory:
-        return CostHistory(self.changes, self.length, self.fold.verdict == VALID)
-
-    def costs(self, seq: Ints, node: Ints) -> Floats:
-        """Return what nodes cost after events, nan where they do not exist yet, shape (k,)."""
-        if len(self.rewires):
-            return self._history.at(seq, node)[0]
-        exist = (node >= 0) & (node < np.searchsorted(self.edges["seq"], seq, side="right"))
-        cost = np.full(len(node), np.nan)
-        cost[exist] = self.fold.cost[node[exist]]
-        return cost
-
-
-@dataclass(frozen=True, eq=False)
 class Context:
-    """A recording under examination; what several rules need is worked out once.
+    """A recording, and what several rules need to know of it.
+
+    Args:
+        recording: The recording.
+        contract: What the planner promises; by default what the recording states.
 
     Attributes:
-        manifest: The run's.
-        world: The run's.
-        kept: What is kept of the log, which is read in windows.
-        robot: What moves.
+        manifest: What was run.
+        world: Where.
+        result: The metrics that are stored at the recording's end; None if that is missing.
+        robot: What moves, resolved in the world.
         start: First configuration, shape (dof,).
         goal: Last configuration, shape (dof,).
-        lower: Least configuration, shape (dof,).
-        upper: Greatest configuration, shape (dof,).
-        contract: What the planner promises, by the settings that it ended with.
-        stretches: The number of the event that each contract rules from, and the contract: more
-            than one where a run went on from a recorded one with other settings.
-        known: Whether there is a contract.
-        breaks_off: Says, once the log was read, whether it breaks off.
-        figures: What stands at the recording's end, under the names of `Metrics`; None where
-            nothing does.
+        lower: Least value of each coordinate, shape (dof,).
+        upper: Greatest value of each coordinate, shape (dof,).
+        stretches: For each contract the number of its first event, and the contract: more than
+            one where the run is a branch with other settings.
+        contract: The last of them, an empty one if the recording states none.
+        has_contract: Whether it states one.
+        kept: The events that are kept for the end.
+        drawn: The samples of the current window.
+        iterations: The iterations of a planner that grows trees, as far as they end in the current
+            window; see `brrt.verification.timeline`.
+
+    Raises:
+        BrrtError: Start or goal is not free in the world, or the manifest is damaged.
     """
 
-    manifest: Manifest
-    world: World
-    kept: Kept
-    robot: Any
-    start: Floats
-    goal: Floats
-    lower: Floats
-    upper: Floats
-    contract: Contract
-    stretches: tuple[tuple[int, Contract], ...]
-    known: bool
-    breaks_off: Callable[[], bool]
-    figures: Mapping[str, Any] | None = None
-
-    @classmethod
-    def of(
-        cls,
-        manifest: Manifest,
-        world: World,
-        contract: Contract | None = None,
-        breaks_off: Callable[[], bool] = lambda: False,
-        figures: Mapping[str, Any] | None = None,
-    ) -> Self:
-        """Open the case of a recording.
-
-        Args:
-            manifest: The run's.
-            world: The run's.
-            contract: What the planner promises; by default what the recording states.
-            breaks_off: Says, once the log was read, whether it breaks off.
-            figures: What stands at the recording's end.
-
-        Raises:
-            BrrtError: Its query is of no use in its world.
-        """
-        query = Query.recorded(manifest, world)
-        stated = contracts_of(manifest, world) if contract is None else (contract,)
-        stretches = tuple(
-            (first, each or Contract())
-            for (first, _), each in zip(manifest.stretches, stated, strict=False)
+    def __init__(self, recording: Recording, contract: Contract | None = None) -> None:
+        self.manifest, self.world = recording.manifest, recording.world
+        self.result, self.dof = recording.result, recording.manifest.dof
+        query = Query.recorded(self.manifest, self.world)
+        self.robot, self.start, self.goal = query.robot, query.start, query.goal
+        self.lower, self.upper = query.lower, query.upper
+        stated = (contract,) if contract else contracts_of(self.manifest, self.world)
+        firsts = [first for first, _ in self.manifest.stretches]
+        self.stretches = tuple(
+            (first, each or Contract()) for first, each in zip(firsts, stated, strict=False)
         )
-        return cls(
-            manifest, world, Kept(manifest.dof, stretches[-1][1]), query.robot, query.start,
-            query.goal, query.lower, query.upper, stretches[-1][1], stretches,
-            stated[-1] is not None, breaks_off, figures,
-        )  # fmt: skip
+        self.contract, self.has_contract = self.stretches[-1][1], stated[-1] is not None
+        self.kept = KeptEvents(self.dof, self.contract)
+        self._draws = DrawHistory(self.distance, self.goal, self.tolerance)
+        self._timeline = Timeline(self.dof, set(firsts))
+        self._grows = any(contract.growth is not None for _, contract in self.stretches)
+        self.drawn: Drawn
+        self.iterations: Table
 
-    @cached_property
-    def scripts(self) -> Scripts:
-        """The log's events in one table, iteration by iteration, for rules that read it so."""
-        growing = any(contract.growth is not None for _, contract in self.stretches)
-        return Scripts(self.dof, {first for first, _ in self.stretches}, growing=growing)
+    def advance(self, window: Events) -> Contract:
+        """Go on to the next events; return the contract that they were made under."""
+        self.kept.add(window)
+        firsts = [table[:1] for table in window.tables.values() if len(table)]
+        # Windows end where stretches end.
+        stretch = min(int(self.stretch(first)[0]) for first in firsts)
+        contract = self.stretches[stretch][1]
+        self.drawn = self._draws.next(window, contract.step or 0.0)
+        if self._grows:
+            self.iterations = self._timeline.next(window)
+        return contract
+
+    def end(self) -> None:
+        """Go on to the last iteration, once all events have been read."""
+        self.iterations = self._timeline.rest()
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the run's end is missing."""
+        return self.result is None
 
     @cached_property
     def events(self) -> Events:
-        """What is kept of the log; there once the last window was read."""
+        """The events that were kept, once all windows have been read."""
         return self.kept.events()
 
-    @property
-    def cut(self) -> bool:
-        """Whether the log breaks off; known once the last window was read."""
-        return self.breaks_off()
-
-    @property
-    def dof(self) -> int:
-        """Numbers in a configuration."""
-        return self.manifest.dof
-
-    def stretch(self, table: Table) -> NDArray[np.int64]:
+    def stretch(self, table: Table) -> Ints:
         """Return which of the `stretches` each event belongs to, shape (n,)."""
         firsts = [first for first, _ in self.stretches]
         return np.maximum(np.searchsorted(firsts, table["seq"], side="right") - 1, 0)
 
-    def ruling(self, window: Events | None) -> Contract:
-        """Return the contract that rules a window, which ends where another one begins to rule."""
-        heads = [table[:1] for table in window.tables.values()] if window is not None else []
-        if not heads:
-            return self.contract
-        return self.stretches[min(int(self.stretch(head)[0]) for head in heads if len(head))][1]
-
-    def limits(self, table: Table, figure: Callable[[Contract], float | None]) -> Floats:
-        """Return a limit that each event is held to, infinite where there is none, shape (n,)."""
-        found = [figure(contract) for _, contract in self.stretches]
-        each = np.array([np.inf if limit is None else limit for limit in found])
-        return np.asarray(each[self.stretch(table)])
+    def limits(self, table: Table, limit: Callable[[Contract], float | None]) -> Floats:
+        """Return the limit that the contract sets for each event, infinite for None, shape (n,)."""
+        found = [limit(contract) for _, contract in self.stretches]
+        return np.array([np.inf if each is None else each for each in found])[self.stretch(table)]
 
     def distance(self, a: Floats, b: Floats) -> Floats:
-        """Distances in the robot's metric between rows of configurations."""
+        """Measure distances between rows of configurations in the robot's metric."""
         return np.asarray(self.robot.distance(np.asarray(a), np.asarray(b)))
 
     @cached_property
-    def blur(self) -> float:
-        """Lengths that differ by this much are the same, however short they are."""
-        ends = np.abs([self.lower, self.upper])
-        return ROUNDING * float(ends.max())
+    def tolerance(self) -> float:
+        """Absolute tolerance of lengths."""
+        return ROUNDING * float(np.abs([self.lower, self.upper]).max())
 
-    def same(self, a: Floats, b: Floats) -> NDArray[np.bool_]:
-        """Whether lengths are equal within rounding; not a number equals nothing."""
-        return np.asarray(np.abs(a - b) <= CLOSE * np.abs(b) + self.blur)
+    def equal(self, a: Floats, b: Floats) -> Flags:
+        """Return whether lengths are equal within rounding; not a number equals nothing."""
+        return np.asarray(np.abs(a - b) <= CLOSE * np.abs(b) + self.tolerance)
 
-    def at_most(self, a: Floats, most: Floats | float) -> NDArray[np.bool_]:
-        """Whether lengths are within a limit, but for rounding."""
-        return np.asarray(a <= np.asarray(most) * (1 + CLOSE) + self.blur)
+    def at_most(self, a: Floats, limit: Floats | float) -> Flags:
+        """Return whether lengths are within a limit, within rounding."""
+        return np.asarray(a <= np.asarray(limit) * (1 + CLOSE) + self.tolerance)
 
     @cached_property
     def obstacles(self) -> Obstacles:
         """The world's obstacles under one numbering."""
         return Obstacles(self.world)
 
-    def blocked(self, a: Floats, b: Floats) -> NDArray[np.int64]:
-        """For each motion the number of an obstacle that it runs into, or -1."""
+    def first_hits(self, a: Floats, b: Floats) -> Ints:
+        """Return for each motion the number of an obstacle that it hits, or -1, shape (n,)."""
         return first_hits(self.obstacles, self.robot, np.asarray(a), np.asarray(b))
-
-    def look_free(
-        self,
-        result: RuleResult,
-        table: Table,
-        a: Floats,
-        b: Floats,
-        what: str,
-        name: str | None = None,
-    ) -> None:
-        """See that the motion of each row of a table is free.
-
-        Args:
-            result: Takes it in.
-            table: The events, shape (n,).
-            a: Where motions begin, shape (n, dof).
-            b: Where they end, shape (n, dof).
-            what: What a motion is.
-            name: The field that tells it from others; None where none does.
-        """
-        hit = self.blocked(a, b)
-
-        def say(i: int) -> str:
-            which = what if name is None else f"{what} {table[name][i]}"
-            return f"{which} hits {self.obstacles.name(int(hit[i]))}"
-
-        result.look(table, hit >= 0, say)
 
     @cached_property
     def trees(self) -> list[TreeHistory]:
-        """The trees, each with its costs at every moment."""
-        tables = self.events[Kind.EDGE], self.events[Kind.REWIRE]
-        return [TreeHistory.of(number, self.events, self.distance) for number in trees_in(*tables)]
+        """The trees."""
+        numbers = trees_in(self.events[Kind.EDGE], self.events[Kind.REWIRE])
+        return [TreeHistory.of(number, self.events, self.distance) for number in numbers]
 
     @cached_property
     def paths(self) -> list[tuple[Any, Floats]]:
-        """Each path's event, and its waypoints, shape (n, dof)."""
+        """The event of each path, and its waypoints, shape (n, dof)."""
         return [(event, waypoints(event, self.dof)) for event in self.events[Kind.PATH]]
 
     @property
-    def found(self) -> list[tuple[Any, Floats]]:
-        """The paths that the planner found, better ones after worse."""
+    def planned_paths(self) -> list[tuple[Any, Floats]]:
+        """The paths that the planner found, the smoothed ones left out."""
         return [path for path in self.paths if path[0]["stage"] != Stage.SMOOTHED]
 
     @cached_property
     def outcome(self) -> Status | None:
-        """How planning ended; None where the log does not say."""
+        """How planning ended; None if the log does not state that."""
         phases = self.events[Kind.PHASE]
         ends = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)]
         last = int(ends["status"][-1]) if len(ends) else -1

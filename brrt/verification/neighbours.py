@@ -1,7 +1,7 @@
-"""Which nodes are near: by the triangle inequality alone, so in any metric, and no planner's tree.
+"""Nodes near given places, in any metric, by the triangle inequality alone.
 
-Nodes that lie together make a block, with a centre and the farthest of them from it. A block whose
-centre is farther from a place than that and the radius asked for holds nothing near the place.
+Nodes that are close together form a block, with a centre and a radius. A block whose centre is
+farther from a place than its radius and the radius of the search holds no node near the place.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,20 +20,20 @@ _SLACK = 1e-9
 _GOLDEN = 0.6180339887498949
 
 
-class Neighbours:
-    """The nodes of a tree that are near some places, as the tree stood at some moments.
+class NeighbourSearch:
+    """Finds the nodes of a tree that were near given places at given moments.
 
     Args:
         q: The nodes in the order in which they joined, shape (n, dof).
         distance: The robot's metric.
-        places: Where to look, shape (m, dof).
-        radius: How far, shape (m,).
-        count: Nodes that there were, shape (m,).
-        most: Distances to measure in each doubling of the tree; beyond it places are left out,
-            all over the log.
+        places: The centres of the searches, shape (m, dof).
+        radius: Their radii, shape (m,).
+        count: How many nodes there were, shape (m,).
+        most: Distances to measure in each doubling of the tree; places beyond that, spread over
+            all of them, are skipped.
 
     Attributes:
-        looked: Which places were not left out, shape (m,); known after `pairs`.
+        searched: Which places were not skipped, shape (m,); known after `pairs`.
     """
 
     def __init__(
@@ -41,18 +41,18 @@ class Neighbours:
     ) -> None:
         self._q, self._distance, self._places, self._radius = q, distance, places, radius
         self._count, self._most = count, most
-        self.looked = np.zeros(len(places), bool)
+        self.searched = np.zeros(len(places), bool)
 
     def pairs(self) -> Iterator[tuple[Ints, Ints, Floats]]:
-        """Yield places, nodes within their radius, and how far these are; each place at once."""
-        # A tree that counted up to 2^k nodes is looked up among the first 2^k.
+        """Yield places, nodes within their radius, and distances; all nodes of a place together."""
+        # Trees of up to 2^k nodes are searched in blocks of the first 2^k nodes.
         level = np.ceil(np.log2(np.maximum(self._count, 1))).astype(np.int64)
         for k in np.unique(level).tolist():
             yield from self._among(np.flatnonzero(level == k), 1 << k)
 
     def _among(self, rows: Ints, nodes: int) -> Iterator[tuple[Ints, Ints, Floats]]:
         order, size, centres, far = self._blocks(nodes)
-        # Any beginning of this order is spread over the whole.
+        # In this order, the first n places are spread over all for every n.
         rows = rows[np.argsort(np.arange(len(rows)) * _GOLDEN % 1.0)]
         left, at_once = self._most, max(1, _AT_ONCE // len(centres))
         for first in range(0, len(rows), at_once):
@@ -62,19 +62,19 @@ class Neighbours:
             apart = self._distance(self._places[some][:, None], centres[None])
             reach = far + self._radius[some][:, None]
             place, block = np.nonzero(apart <= reach * (1 + _SLACK))
-            # Places that would take more than is left are left out.
+            # Places that would exceed the limit are skipped.
             ends = np.searchsorted(place, np.arange(1, len(some) + 1))
             spent = np.arange(1, len(some) + 1) * len(centres) + ends * size
             done = max(int(np.searchsorted(spent, left)), 1)
             left -= int(spent[done - 1])
             some, chosen = some[:done], slice(ends[done - 1])
-            self.looked[some] = True
+            self.searched[some] = True
             yield from self._within(some, place[chosen], block[chosen], order, size)
 
     def _within(
         self, rows: Ints, place: Ints, block: Ints, order: Ints, size: int
     ) -> Iterator[tuple[Ints, Ints, Floats]]:
-        """Yield what is near among the nodes of blocks, a few places at a time."""
+        """Yield near nodes of the blocks, for a few places at a time."""
         batch = np.searchsorted(place, np.arange(len(rows) + 1)) * size // _AT_ONCE
         parts = np.split(np.arange(len(rows)), np.flatnonzero(np.diff(batch[:-1])) + 1)
         for part in parts:
@@ -90,7 +90,7 @@ class Neighbours:
             yield here[near], node[near], far[near]
 
     def _blocks(self, nodes: int) -> tuple[Ints, int, Floats, Floats]:
-        """Sort the first nodes into blocks of a size; return centres, and how far each reaches."""
+        """Sort the first nodes into blocks; return order, block size, centres and radii."""
         q = self._q[:nodes]
         order, size = np.argsort(_curve(q), kind="stable"), max(8, int(len(q) ** 0.5))
         starts = np.arange(0, len(q), size)
@@ -106,7 +106,7 @@ class Neighbours:
 
 
 def _curve(q: Floats) -> Ints:
-    """Number places along a curve that leaves no neighbourhood in a hurry (Morton 1966)."""
+    """Return the numbers of places along a space-filling curve (Morton 1966), shape (n,)."""
     low, high = q.min(axis=0), q.max(axis=0)
     bits, wide = min(16, 60 // q.shape[1]), np.where(high > low, high - low, 1)
     keys = np.zeros(len(q), np.int64)
@@ -119,15 +119,15 @@ def _curve(q: Floats) -> Ints:
     return keys
 
 
-def nearest(near: Neighbours) -> tuple[Ints, Floats, Floats]:
-    """Return for each place its nearest node, or -1 where none is near, and how far two are.
+def nearest(search: NeighbourSearch) -> tuple[Ints, Floats, Floats]:
+    """Return the node nearest to each place within its radius, or -1.
 
     Returns:
-        The nodes, their distances, and those of the second nearest nodes; inf where there is none.
+        The nodes, their distances, and the distances of the second nearest nodes; inf for none.
     """
-    m = len(near.looked)
+    m = len(search.searched)
     node, least, second = np.full(m, -1), np.full(m, np.inf), np.full(m, np.inf)
-    for places, others, away in near.pairs():
+    for places, others, away in search.pairs():
         order = np.lexsort((away, places))
         place, other, far = places[order], others[order], away[order]
         first = np.flatnonzero(np.diff(place, prepend=-1))

@@ -1,4 +1,4 @@
-"""How rules say what they found."""
+"""What rules find in a recording."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 
 from brrt.events import Table
 
-_SHOWN = 20
+_MOST = 20
+"""Findings of a rule that are kept; all are counted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A promise that an event breaks.
+    """A broken promise.
 
     Attributes:
         rule: Name of the rule.
-        seq: The event's number; -1 where the whole log is meant.
-        t: Its time in ns.
-        message: What is wrong with it.
+        seq: Number of the event that breaks it; -1 for the recording as a whole.
+        t: Time of the event in ns.
+        message: What is wrong.
     """
 
     rule: str
@@ -31,14 +32,14 @@ class Finding:
 
 @dataclass(slots=True)
 class RuleResult:
-    """What a rule looked at; of many findings the first are kept, all are counted.
+    """What a rule examined and found.
 
     Attributes:
         rule: Name of the rule.
-        promise: What it holds a run to.
-        examined: Things looked at.
-        broken: Things that break the promise.
-        findings: The first of those.
+        promise: What it judges.
+        examined: Events, or other items, that it judged.
+        broken: Those of them that break the promise.
+        findings: The first of those, in the order in which they were found.
     """
 
     rule: str
@@ -47,30 +48,24 @@ class RuleResult:
     broken: int = 0
     findings: list[Finding] = field(default_factory=list)
 
-    def look(self, table: Table, wrong: NDArray[np.bool_], say: Callable[[int], str]) -> None:
-        """Take in rows of a table.
+    def add(self, table: Table, wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
+        """Add judged events.
 
         Args:
-            table: Events, shape (n,).
+            table: The events, shape (n,).
             wrong: Which of them break the promise, shape (n,).
-            say: What is wrong with the row of that number.
+            message: Returns what is wrong with the event in a row.
         """
         self.examined += len(table)
-        at = np.flatnonzero(wrong)
-        self.broken += len(at)
-        for i in at[: _SHOWN - len(self.findings)].tolist():
-            row = table[i]
-            self.findings.append(Finding(self.rule, int(row["seq"]), int(row["t"]), say(i)))
+        rows = np.flatnonzero(wrong)
+        self.broken += len(rows)
+        for i in rows[: _MOST - len(self.findings)].tolist():
+            event = table[i]
+            self.findings.append(Finding(self.rule, int(event["seq"]), int(event["t"]), message(i)))
 
-    def one(self, event: Any, message: str | None) -> None:
-        """Take in one event, or None for the log as a whole; no message where all is well."""
-        self.examined += 1
-        if message is not None:
-            self.fault(event, message)
-
-    def fault(self, event: Any, message: str) -> None:
-        """Find fault with an event, or with the log as a whole, that was looked at before."""
+    def add_finding(self, event: Any, message: str) -> None:
+        """Add a finding on an event that is counted already, or on the whole recording (None)."""
         self.broken += 1
-        if len(self.findings) < _SHOWN:
+        if len(self.findings) < _MOST:
             seq, t = (-1, 0) if event is None else (int(event["seq"]), int(event["t"]))
             self.findings.append(Finding(self.rule, seq, t, message))

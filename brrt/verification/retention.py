@@ -1,4 +1,4 @@
-"""What is kept of a log that is read in windows: little of the many, all of the few."""
+"""Which events are kept until the end of a log: all of rare kinds, a selection of the others."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,46 +7,46 @@ from brrt.events import Events, Kind, Reason, Table
 from brrt.scenario.contract import Contract
 
 
-class Thinned:
-    """Rows of a long table, evenly spread over it.
+class SpreadRows:
+    """Keeps rows of a long table, evenly spread over it.
 
     Args:
-        dtype: Of the table.
-        most: Rows that are wanted at most.
+        dtype: Layout of the table.
+        most: The number of rows to keep, at most.
     """
 
     def __init__(self, dtype: np.dtype[np.void], most: int) -> None:
         self._rows, self._most, self._stride, self._seen = np.empty(0, dtype), most, 1, 0
 
     def due(self, count: int) -> slice:
-        """Which of the next rows to keep: those of a number that the stride divides."""
+        """Return which of the next rows to keep: those of a number that the stride divides."""
         first = -self._seen % self._stride
         self._seen += count
         return slice(first, None, self._stride)
 
     def add(self, table: Table) -> None:
-        """Take in the next rows."""
+        """Take the next rows of the table."""
         self.keep(table[self.due(len(table))])
 
     def keep(self, rows: Table) -> None:
-        """Keep rows that were due."""
+        """Keep rows that `due` has chosen."""
         self._rows = np.concatenate([self._rows, rows])
         while len(self._rows) > 2 * self._most:
             self._rows, self._stride = self._rows[::2], 2 * self._stride
 
     def rows(self) -> Table:
-        """Return what is kept, at most what is wanted."""
+        """Return the kept rows, no more than wanted."""
         rows = self._rows
         if len(rows) > self._most:
             rows = rows[np.linspace(0, len(rows) - 1, self._most).astype(np.int64)]
         return rows
 
 
-class _Rows:
-    """Rows of a long table, as they come.
+class _GrowingTable:
+    """A table that grows row by row.
 
-    They stand in one block of which each is twice as large as the one before: large blocks go back
-    to the system, where many small ones would leave holes as large as the whole.
+    It is one block, which doubles when it is full: large blocks are returned to the system, where
+    many small ones would leave holes.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class _Rows:
         self._count = 0
 
     def add(self, rows: Table) -> None:
-        """Take in the next rows; the first are not copied."""
+        """Append rows; the first ones are not copied."""
         if self._block is None:
             self._block, self._count = rows, len(rows)
             return
@@ -66,40 +66,41 @@ class _Rows:
         self._block[first : self._count] = rows
 
     def table(self) -> Table | None:
-        """Return them; None where there are none."""
+        """Return the rows; None if there are none."""
         return None if self._block is None else self._block[: self._count]
 
 
-class Kept:
-    """The events that rules look at once the whole log has been read.
+class KeptEvents:
+    """The events that rules judge once all have been read.
 
-    Of a planner that grows trees that is all but the samples and most rejections: rules that look
-    at these do so while the log is read.
+    For planners that grow trees that is everything but samples and most rejections, which rules
+    judge window by window.
 
     Args:
         dof: Numbers in a configuration.
         contract: What the planner promises.
 
     Attributes:
-        last_iteration: The greatest so far.
-        count: Events so far, kept or not.
+        last_iteration: The greatest iteration so far.
+        kinds: The kinds that have occurred, kept or not.
     """
 
     def __init__(self, dof: int, contract: Contract) -> None:
         self._dof, self._contract = dof, contract
-        self._rows: dict[Kind, _Rows] = {kind: _Rows() for kind in Kind}
-        self.last_iteration = self.count = 0
+        self._tables: dict[Kind, _GrowingTable] = {kind: _GrowingTable() for kind in Kind}
+        self.last_iteration = 0
+        self.kinds: set[Kind] = set()
 
-    def take(self, window: Events) -> None:
+    def add(self, window: Events) -> None:
         """Keep what is needed of the next events."""
         for kind, table in window.tables.items():
             if not len(table):
                 continue
-            self.count += len(table)
+            self.kinds.add(kind)
             self.last_iteration = max(self.last_iteration, int(table["iteration"].max()))
             rows = self._needed(kind, table)
             if rows is not None:
-                self._rows[kind].add(table if rows.all() else table[rows])
+                self._tables[kind].add(table if rows.all() else table[rows])
 
     def _needed(self, kind: Kind, table: Table) -> NDArray[np.bool_] | None:
         if kind is Kind.SAMPLE:
@@ -111,6 +112,6 @@ class Kept:
         return np.ones(len(table), bool)
 
     def events(self) -> Events:
-        """Return what was kept."""
-        tables = {kind: rows.table() for kind, rows in self._rows.items()}
+        """Return the kept events."""
+        tables = {kind: rows.table() for kind, rows in self._tables.items()}
         return Events(self._dof, {k: table for k, table in tables.items() if table is not None})

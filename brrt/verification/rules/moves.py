@@ -5,177 +5,202 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.collision.motions import towards
 from brrt.events import Kind, Phase, Status, Table
-from brrt.verification.context import CLOSE, Context
-from brrt.verification.result import RuleResult
-from brrt.verification.rules.log import text
+from brrt.replay.text import vector
+from brrt.collision.motions import towards
+from brrt.verification.context import Context
+from brrt.verification.rule import Rule
+from brrt.verification.tolerances import CLOSE
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
-def _from(context: Context) -> tuple[Table, Floats, Floats, NDArray[np.bool_]]:
-    """All moves, where each begins and ends, shape (n, dof), and which are the first of a trial."""
-    table = context.events[Kind.MOVE]
-    q = np.asarray(table["q"])
-    first = np.ones(len(table), bool)
-    first[1:] = np.diff(table["trial"]) != 0
-    before = np.concatenate([q[:1], q[:-1]])
-    before[first] = context.start
-    return table, before, q, first
+class MoveRule(Rule):
+    """A rule that judges all moves."""
+
+    def finish(self) -> None:
+        """Judge the moves, with where each begins and which are the first of a trial."""
+        table = self.context.events[Kind.MOVE]
+        first = np.diff(table["trial"], prepend=-1) != 0
+        first[:1] = True
+        before = np.concatenate([table["q"][:1], table["q"][:-1]])
+        before[first] = self.context.start
+        self.judge_moves(table, before, first)
+
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        """Judge moves.
+
+        Args:
+            table: The moves, shape (n,).
+            before: Where each begins, shape (n, dof).
+            first: Which are the first of a trial, shape (n,).
+        """
+        raise NotImplementedError
 
 
-def moves(context: Context, result: RuleResult) -> None:
-    """Trials count 0, 1, 2 ..., and the moves of each 1, 2, 3 ..."""
-    table, _, _, first = _from(context)
-    trial = np.cumsum(first) - 1
-    starts = np.flatnonzero(first)
-    step = np.arange(len(table)) - (starts[trial] if len(table) else 0) + 1
-    wrong = (table["trial"] != trial) | (table["step"] != step)
-    result.look(
-        table, wrong,
-        lambda i: (
-            f"step {table['step'][i]} of trial {table['trial'][i]}, "
-            f"where step {step[i]} of trial {trial[i]} is due"
-        ),
-    )  # fmt: skip
+class Moves(MoveRule):
+    name = "moves"
+    promise = "Trials count 0, 1, 2 ..., and the moves of each 1, 2, 3 ..."
+
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        trial = np.cumsum(first) - 1
+        starts = np.flatnonzero(first)
+        step = np.arange(len(table)) - (starts[trial] if len(table) else 0) + 1
+        self.judge(
+            table, (table["trial"] != trial) | (table["step"] != step),
+            lambda i: (
+                f"step {table['step'][i]} of trial {table['trial'][i]}, not "
+                f"step {step[i]} of trial {trial[i]}"
+            ),
+        )  # fmt: skip
 
 
-def move_costs(context: Context, result: RuleResult) -> None:
-    """A move's cost is that of the one before it and its own length."""
-    table, before, q, first = _from(context)
-    stated = np.asarray(table["cost"])
-    previous = np.concatenate([[0.0], stated])[:-1]
-    cost = np.where(first, 0.0, previous) + context.distance(before, q)
-    result.look(
-        table, ~context.same(stated, cost),
-        lambda i: f"said to cost {stated[i]:.12g} so far; it costs {cost[i]:.12g}",
-    )  # fmt: skip
+class MoveCosts(MoveRule):
+    name = "move costs"
+    promise = "A move's cost is that of the move before plus its own length."
+
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        stated = np.asarray(table["cost"])
+        previous = np.append(0.0, stated)[:-1]
+        cost = np.where(first, 0.0, previous) + self.context.distance(before, table["q"])
+        self.judge(
+            table, ~self.context.equal(stated, cost),
+            lambda i: f"the moves cost {cost[i]:.12g} so far, not {stated[i]:.12g}",
+        )  # fmt: skip
 
 
-def move_lengths(context: Context, result: RuleResult) -> None:
-    """No move is longer than allowed."""
-    table, before, q, _ = _from(context)
-    length = context.distance(before, q)
-    most = _longest(context, table)
-    result.look(
-        table, ~context.at_most(length, most),
-        lambda i: f"a move of {length[i]:.12g}; the limit is {most[i]:.12g}",
-    )  # fmt: skip
+class MoveLengths(MoveRule):
+    name = "move lengths"
+    promise = "No move is longer than allowed."
+
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        context, lattice = self.context, self.context.contract.lattice
+        length, limit = context.distance(before, table["q"]), np.full(len(table), np.inf)
+        if lattice is not None:
+            diagonal = lattice.epsilon * (np.sqrt(context.world.dim) if lattice.diagonals else 1.0)
+            limit[:] = max(lattice.max_move, diagonal)
+        limit[_along_path(context, table)] = context.manifest.scenario.max_move
+        self.judge(
+            table, ~context.at_most(length, limit),
+            lambda i: f"a move of {length[i]:.12g}; the limit is {limit[i]:.12g}",
+        )  # fmt: skip
 
 
-def _executed(context: Context, table: Table) -> NDArray[np.bool_]:
-    """Which moves follow a path that stands, in a phase of its own."""
+def _along_path(context: Context, table: Table) -> Flags:
+    """Return which moves execute a path, in a phase of its own, shape (n,)."""
     phases = context.events[Kind.PHASE]
     begins = phases["seq"][(phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.BEGIN)]
     first = int(begins[0]) if len(begins) else 1 << 62
-    return np.asarray(table["seq"] > first) & (table["cell"] < 0)
+    return np.asarray((table["seq"] > first) & (table["cell"] < 0))
 
 
-def _longest(context: Context, table: Table) -> Floats:
-    """Longest move allowed, for each."""
-    most = np.full(len(table), np.inf)
-    lattice = context.contract.lattice
-    if lattice is not None:
-        diagonal = lattice.epsilon * (np.sqrt(context.world.dim) if lattice.diagonals else 1.0)
-        most[:] = max(lattice.max_move, diagonal)
-    most[_executed(context, table)] = context.manifest.scenario.max_move
-    return most
+class MovesFree(MoveRule):
+    name = "moves free"
+    promise = "Every move is free of obstacles."
+
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        self.judge_free(table, before, table["q"], "move")
 
 
-def moves_free(context: Context, result: RuleResult) -> None:
-    """Every move is free of obstacles."""
-    table, before, q, _ = _from(context)
-    context.look_free(result, table, before, q, "move")
+class Arrival(Rule):
+    name = "arrival"
+    promise = "A robot that is done has made its last move to the goal."
+    of_end = True
+
+    def finish(self) -> None:
+        context = self.context
+        table, phases = context.events[Kind.MOVE], context.events[Kind.PHASE]
+        done = ((phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.DONE)).any()
+        stopped = (phases["status"][-1:] == Status.INTERRUPTED).any()
+        solved = context.outcome is Status.SOLVED and (len(table) or context.contract.learns)
+        if context.is_cut or stopped or not (done or solved):
+            return
+        last = np.asarray(table["q"][-1]) if len(table) else context.start
+        wrong = None if (last == context.goal).all() else f"the last move ends at {vector(last)}"
+        self.judge_one(table[-1] if len(table) else None, wrong)
 
 
-def arrival(context: Context, result: RuleResult) -> None:
-    """Where the robot has done what it was to do, its last move ends at the goal."""
-    table, phases = context.events[Kind.MOVE], context.events[Kind.PHASE]
-    done = ((phases["name"] == Phase.EXECUTE) & (phases["status"] == Status.DONE)).any()
-    stopped = (phases["status"][-1:] == Status.INTERRUPTED).any()
-    solved = context.outcome is Status.SOLVED and (len(table) or context.contract.learns)
-    if context.cut or stopped or not (done or solved):
-        return
-    last = np.asarray(table["q"][-1]) if len(table) else context.start
-    there, event = (last == context.goal).all(), table[-1] if len(table) else None
-    result.one(event, None if there else f"the last move ends at {text(last)}, not at the goal")
+class PathsWalked(Rule):
+    name = "paths walked"
+    promise = "The path of a trial of a robot that learns is where it went, reported on arrival."
+    needs = "lattice"
+
+    def finish(self) -> None:
+        context, lattice = self.context, self.context.contract.lattice
+        table, paths = context.events[Kind.MOVE], context.planned_paths
+        if lattice is None or lattice.lookahead is None:
+            return
+        for trial, (event, path) in enumerate(paths):
+            mine = table[table["trial"] == trial]
+            walked = np.concatenate([context.start[None], mine["q"]])
+            wrong = None
+            if len(mine) and mine["seq"][-1] > event["seq"]:
+                wrong = f"trial {trial} continues after its path was reported"
+            elif len(mine) and mine["cell"][-1] < 0 and mine["seq"][-1] + 1 != event["seq"]:
+                wrong = f"trial {trial} arrived before, with event {mine['seq'][-1]}"
+            elif not np.array_equal(walked, path):
+                wrong = f"not where the robot went in trial {trial}"
+            self.judge_one(event, wrong)
+        more = table[table["trial"] > len(paths)][:1]
+        self.judge(
+            more, np.ones(len(more), bool),
+            lambda i: f"trial {more['trial'][i]} begins; only {len(paths)} have arrived",
+        )  # fmt: skip
+        if context.outcome is Status.SOLVED and len(paths) < lattice.trials:
+            self.judge_one(None, f"{len(paths)} of {lattice.trials} trials arrived")
 
 
-def paths_walked(context: Context, result: RuleResult) -> None:
-    """Of a robot that learns as it goes, each trial is a path: where it went, told on arrival."""
-    lattice, table = context.contract.lattice, context.events[Kind.MOVE]
-    if lattice is None or lattice.lookahead is None:
-        return
-    for trial, (event, path) in enumerate(context.found):
-        mine = table[table["trial"] == trial]
-        way = np.concatenate([context.start[None], np.asarray(mine["q"])])
-        wrong = None if np.array_equal(way, path) else f"not where the robot went in trial {trial}"
-        if len(mine) and mine["seq"][-1] > event["seq"]:
-            wrong = f"trial {trial} goes on after its path was told"
-        elif len(mine) and mine["cell"][-1] < 0 and mine["seq"][-1] + 1 != event["seq"]:
-            wrong = f"trial {trial} had arrived before, with event {mine['seq'][-1]}"
-        result.one(event, wrong)
-    untold = table[table["trial"] > len(context.found)]
-    result.look(
-        untold[:1], np.ones(len(untold[:1]), bool),
-        lambda i: f"trial {untold['trial'][i]} begins; {len(context.found)} before it arrived",
-    )  # fmt: skip
-    if context.outcome is Status.SOLVED and len(context.found) < lattice.trials:
-        result.one(None, f"{len(context.found)} of {lattice.trials} trials arrived")
+class MovesAlongPath(MoveRule):
+    name = "moves along path"
+    promise = "A robot that executes a path moves along it, forwards, and cuts no corner."
 
-
-def moves_along_path(context: Context, result: RuleResult) -> None:
-    """A robot that executes a path moves along it, forwards, and cuts no corner."""
-    table, before, q, _ = _from(context)
-    chosen = _executed(context, table)
-    if not chosen.any():
-        return
-    if not context.paths:
-        result.one(table[chosen][0], "a move without a path")
-        return
-    path = _Polyline(context, context.paths[-1][1])
-    at = 0.0
-    for event, a, b in zip(table[chosen], before[chosen], q[chosen], strict=True):
-        if (a == context.start).all():
-            at = 0.0
-        on = path.along(b, at)
-        length = float(context.distance(a[None], b[None])[0])
-        wrong = None
-        if on is None:
-            wrong = f"{text(b)} is not ahead on the path"
-        elif abs(on - at - length) > CLOSE * path.length + context.blur:
-            wrong = f"{text(b)} lies {on - at:.12g} ahead on the path, but {length:.12g} away"
-        at = at if on is None else on
-        result.one(event, wrong)
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        context, chosen = self.context, _along_path(self.context, table)
+        if not chosen.any():
+            return
+        if not context.paths:
+            self.judge_one(table[chosen][0], "a move without a path")
+            return
+        path, at = _Polyline(context, context.paths[-1][1]), 0.0
+        for event, a in zip(table[chosen], before[chosen], strict=True):
+            at = 0.0 if (a == context.start).all() else at
+            wrong, q = None, np.asarray(event["q"])
+            end, length = path.position(q, at), float(context.distance(a[None], q[None])[0])
+            if end is None:
+                wrong = f"{vector(q)} is not ahead on the path"
+            elif abs(end - at - length) > path.tolerance:
+                wrong = f"{vector(q)} is {end - at:.12g} ahead on the path, but {length:.12g} away"
+            at = at if end is None else end
+            self.judge_one(event, wrong)
 
 
 class _Polyline:
-    """A path, to find places on."""
+    """A path on which positions are looked up.
+
+    Attributes:
+        tolerance: Absolute tolerance of positions.
+    """
 
     def __init__(self, context: Context, path: Floats) -> None:
-        self.context, self.path = context, path
-        self.steps = towards(context.robot, path[:-1], path[1:])
-        self.ends = np.concatenate([[0.0], np.cumsum(context.distance(path[:-1], path[1:]))])
-        self.length = float(self.ends[-1])
+        self._robot, self._path = context.robot, path
+        self._steps = towards(context.robot, path[:-1], path[1:])
+        self._ends = np.append(0.0, np.cumsum(context.distance(path[:-1], path[1:])))
+        self.tolerance = CLOSE * float(self._ends[-1]) + context.tolerance
 
-    def along(self, q: Floats, least: float) -> float | None:
-        """Say how far along the path a place is, `least` or farther; None where it is not."""
-        slack = CLOSE * self.length + self.context.blur
-        for i, (begin, end) in enumerate(pairwise(map(float, self.ends))):
-            if end < least - slack:
+    def position(self, q: Floats, least: float) -> float | None:
+        """Return how far along the path a configuration is, from `least` on; None if it is not."""
+        for i, (begin, end) in enumerate(pairwise(map(float, self._ends))):
+            if end < least - self.tolerance:
                 continue
-            offset = towards(self.context.robot, self.path[i][None], q[None])[0]
-            square = float(self.steps[i] @ self.steps[i])
-            part = min(max(float(offset @ self.steps[i]) / square, 0.0), 1.0) if square else 0.0
-            apart = np.abs(offset - part * self.steps[i]).max()
-            at = float(begin + part * (end - begin))
-            if apart <= slack and at >= least - slack:
+            step, offset = self._steps[i], towards(self._robot, self._path[i][None], q[None])[0]
+            square = float(step @ step)
+            part = min(max(float(offset @ step) / square, 0.0), 1.0) if square else 0.0
+            at = begin + part * (end - begin)
+            apart = np.abs(offset - part * step).max()
+            if apart <= self.tolerance and at >= least - self.tolerance:
                 return max(at, least)
         return None
 
 
-RULES = (
-    moves, move_costs, move_lengths, moves_free, arrival, paths_walked, moves_along_path,
-)  # fmt: skip
-"""All rules of this file; see `brrt.verification`."""
+RULES = (Moves, MoveCosts, MoveLengths, MovesFree, Arrival, PathsWalked, MovesAlongPath)

@@ -1,213 +1,235 @@
-"""Rules about paths: from start to goal, free, along the trees, and what the smoother made."""
+"""Rules about paths: from start to goal, free, along the trees, and what the smoother makes."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Kind, Phase, Stage, Status
-from brrt.replay.tree_fold import VALID
+from brrt.events import Kind, Phase, Stage, Status, Table
+from brrt.replay.text import vector
 from brrt.verification.context import Context
-from brrt.verification.result import RuleResult
-from brrt.verification.rules.log import text
+from brrt.verification.rule import ANY_PART, Rule
+from brrt.verification.tree_history import TreeHistory
 
 Floats = NDArray[np.float64]
 Place = tuple[float, ...]
 
-
-def path_ends(context: Context, result: RuleResult) -> None:
-    """Paths lead from the start to the goal."""
-    for event, path in context.paths:
-        wrong = None
-        if not len(path):
-            wrong = "a path without waypoints"
-        elif (path[0] != context.start).any():
-            wrong = f"begins at {text(path[0])}; the start is {text(context.start)}"
-        elif (path[-1] != context.goal).any():
-            wrong = f"ends at {text(path[-1])}; the goal is {text(context.goal)}"
-        result.one(event, wrong)
+_NEVER = 1 << 62
 
 
-def paths_free(context: Context, result: RuleResult) -> None:
-    """Every motion of every path is free of obstacles."""
-    ways = [path for _, path in context.paths]
-    if not ways:
-        return
-    starts = np.concatenate([path[:-1] for path in ways])
-    hits = context.blocked(starts, np.concatenate([path[1:] for path in ways]))
-    ends = np.cumsum([max(len(path) - 1, 0) for path in ways])
-    for (event, _), hit in zip(context.paths, np.split(hits, ends[:-1]), strict=True):
-        bad = np.flatnonzero(hit >= 0)
-        name = context.obstacles.name(int(hit[bad[0]])) if len(bad) else ""
-        result.one(event, f"motion {bad[0]} hits {name}" if len(bad) else None)
+class PathEnds(Rule):
+    name = "path ends"
+    promise = "Paths lead from the start to the goal."
+
+    def finish(self) -> None:
+        start, goal = self.context.start, self.context.goal
+        for event, path in self.context.paths:
+            wrong = None
+            if not len(path):
+                wrong = "a path without waypoints"
+            elif (path[0] != start).any():
+                wrong = f"begins at {vector(path[0])}; the start is {vector(start)}"
+            elif (path[-1] != goal).any():
+                wrong = f"ends at {vector(path[-1])}; the goal is {vector(goal)}"
+            self.judge_one(event, wrong)
 
 
-def path_costs(context: Context, result: RuleResult) -> None:
-    """A path's cost is its length in the robot's metric."""
-    for event, path in context.paths:
-        length, stated = context.distance(path[:-1], path[1:]).sum(), float(event["cost"])
-        right = bool(context.same(np.asarray(stated), np.asarray(length)))
-        said = f"said to cost {stated:.12g}; it is {length:.12g} long"
-        result.one(event, None if right else said)
+class PathsFree(Rule):
+    name = "paths free"
+    promise = "Every motion of every path is free of obstacles."
+
+    def finish(self) -> None:
+        context, paths = self.context, self.context.paths
+        if not paths:
+            return
+        starts = np.concatenate([path[:-1] for _, path in paths])
+        hits = context.first_hits(starts, np.concatenate([path[1:] for _, path in paths]))
+        ends = np.cumsum([max(len(path) - 1, 0) for _, path in paths])
+        for (event, _), hit in zip(paths, np.split(hits, ends[:-1]), strict=True):
+            blocked = np.flatnonzero(hit >= 0)
+            name = context.obstacles.name(int(hit[blocked[0]])) if len(blocked) else ""
+            self.judge_one(event, f"motion {blocked[0]} hits {name}" if len(blocked) else None)
 
 
-def paths_improve(context: Context, result: RuleResult) -> None:
-    """The first path that a planner finds is raw, the others cost less; who stops finds but one.
+class PathCosts(Rule):
+    name = "path costs"
+    promise = "A path's cost is its length in the robot's metric."
 
-    Of a robot that learns as it goes each trial's path is raw.
-    """
-    contract, before = context.contract, None
-    learns = contract.learns
-    one = contract.stops is True or (contract.lattice is not None and not learns)
-    for event, _ in context.found:
-        cost, stage, wrong = float(event["cost"]), int(event["stage"]), None
-        due = Stage.RAW if before is None or learns else Stage.IMPROVED
-        if before is not None and stage == Stage.IMPROVED and not cost < before:
-            wrong = f"cost {cost:.12g} after {before:.12g}"
-        elif before is not None and one:
-            wrong = "another path, of a planner that stops at the first"
-        elif context.known and stage != due:
-            wrong = f"said to be of stage {stage}; it is {due.label}"
-        result.one(event, wrong)
-        before = cost
+    def finish(self) -> None:
+        for event, path in self.context.paths:
+            length = self.context.distance(path[:-1], path[1:]).sum()
+            right = bool(self.context.equal(event["cost"], length))
+            wrong = f"the cost is {event['cost']:.12g}; the length, {length:.12g}"
+            self.judge_one(event, None if right else wrong)
 
 
-def paths_in_trees(context: Context, result: RuleResult) -> None:
-    """The motions of a tree planner's path are edges, as parents were then, or links."""
-    if not context.known or not len(context.events[Kind.EDGE]):
-        return
-    wanted = {place for _, path in context.found for place in _places(path)}
-    trees = [_Parents(context, number, wanted) for number in range(len(context.trees))]
-    links = _links(context, trees)
-    for event, path in context.found:
-        for tree in trees:
-            tree.advance(int(event["seq"]))
-        places = _places(path)
-        loose = [
-            i
-            for i, (a, b) in enumerate(pairwise(places))
-            if not (
-                any(tree.joins(a, b) for tree in trees) or links.get((a, b), 1 << 62) < event["seq"]
+class PathsImprove(Rule):
+    name = "paths improve"
+    promise = (
+        "The first path is raw, others cost less; planners that stop find only one, and robots "
+        "that learn one in each trial."
+    )
+
+    def finish(self) -> None:
+        contract, before = self.context.contract, None
+        only_one = contract.stops is True or (contract.lattice is not None and not contract.learns)
+        for event, _ in self.context.planned_paths:
+            cost, stage, wrong = float(event["cost"]), int(event["stage"]), None
+            due = Stage.RAW if before is None or contract.learns else Stage.IMPROVED
+            if before is not None and stage == Stage.IMPROVED and not cost < before:
+                wrong = f"cost {cost:.12g} after {before:.12g}"
+            elif before is not None and only_one:
+                wrong = "a second path of a planner that stops at the first"
+            elif self.context.has_contract and stage != due:
+                wrong = f"has stage {stage}, not {due.label}"
+            self.judge_one(event, wrong)
+            before = cost
+
+
+class PathsInTrees(Rule):
+    name = "paths in trees"
+    promise = "The motions of a tree planner's path are edges of that moment, or links."
+    needs = ANY_PART
+    kind = Kind.EDGE
+
+    def finish(self) -> None:
+        paths = self.context.planned_paths
+        wanted = {place for _, path in paths for place in _places(path)}
+        trees = [_Parents(tree, wanted) for tree in self.context.trees]
+        links = _links(self.context)
+        for event, path in paths if len(self.context.events[Kind.EDGE]) else ():
+            for tree in trees:
+                tree.advance(int(event["seq"]))
+            loose = [
+                i
+                for i, (a, b) in enumerate(pairwise(_places(path)))
+                if not any(tree.joins(a, b) for tree in trees)
+                and links.get((a, b), _NEVER) >= event["seq"]
+            ]
+            self.judge_one(
+                event, f"motion {loose[0]} is neither an edge nor a link" if loose else None
             )
-        ]
-        result.one(event, f"motion {loose[0]} is no edge of a tree and no link" if loose else None)
 
 
 def _places(path: Any) -> list[Place]:
-    """Configurations as keys."""
+    """Return configurations as keys."""
     return [tuple(q) for q in np.asarray(path).tolist()]
 
 
 class _Parents:
-    """The parents of a tree as they stand at some event, and which nodes are at some places."""
+    """The parents in a tree at some event, and which nodes are at some places."""
 
-    def __init__(self, context: Context, number: int, wanted: set[Place]) -> None:
-        tree = context.trees[number]
-        self.q = np.asarray(tree.edges["q"])
-        self.made = tree.changes
-        self.sound = (tree.fold.verdict == VALID) & (tree.changes.parent >= 0)
-        self.parent = np.full(len(tree.edges), -1, np.int64)
-        self.done = 0
+    def __init__(self, tree: TreeHistory, wanted: set[Place]) -> None:
+        self.tree, self.done = tree, 0
+        self.parent = np.full(len(tree), -1, np.int64)
         self.nodes: dict[Place, list[int]] = {}
-        # Looking at one coordinate first leaves few of a large tree's nodes.
+        # The first coordinate alone excludes most nodes of a large tree.
         some = np.unique([place[0] for place in wanted])
-        x = self.q[:, 0]
+        x = tree.q[:, 0]
         at = np.minimum(np.searchsorted(some, x), len(some) - 1)
         near = np.flatnonzero(some[at] == x) if len(some) else np.empty(0, np.int64)
-        for node, place in zip(near.tolist(), _places(self.q[near]), strict=True):
+        for node, place in zip(near.tolist(), _places(tree.q[near]), strict=True):
             if place in wanted:
                 self.nodes.setdefault(place, []).append(node)
 
     def advance(self, seq: int) -> None:
-        """Make the changes up to an event."""
-        end = int(np.searchsorted(self.made.seq, seq))
-        some = np.arange(self.done, end)[self.sound[self.done : end]]
-        # Of several parents of one node numpy keeps the last.
-        self.parent[self.made.node[some]] = self.made.parent[some]
+        """Make the changes before an event."""
+        changes = self.tree.changes
+        end = int(np.searchsorted(changes.seq, seq))
+        rows = np.arange(self.done, end)[self.tree.connected[self.done : end]]
+        self.parent[changes.node[rows]] = changes.parent[rows]  # the last of several counts
         self.done = max(self.done, end)
 
     def joins(self, a: Place, b: Place) -> bool:
-        """Whether one of the places is the other's parent."""
+        """Return whether one of two places is the other's parent."""
         ours, theirs = self.nodes.get(a, []), self.nodes.get(b, [])
         up = {(node, int(self.parent[node])) for node in ours + theirs}
         return any((x, y) in up or (y, x) in up for x in ours for y in theirs)
 
 
-def _links(context: Context, trees: list[_Parents]) -> dict[tuple[Place, Place], int]:
-    """Pairs of places that a link joins, and the number of its event."""
-    by_number = {tree.number: at.q for tree, at in zip(context.trees, trees, strict=True)}
+def _links(context: Context) -> dict[tuple[Place, Place], int]:
+    """Return the number of the first link between two places, in both directions."""
+    trees = {tree.number: tree for tree in context.trees}
     found: dict[tuple[Place, Place], int] = {}
-    for link in context.events[Kind.CONNECT]:
-        ends = []
-        for number, name in ((0, "node"), (1, "other")):
-            q = by_number.get(number, np.empty((0, context.dof)))
-            if 0 <= link[name] < len(q):
-                ends.append(tuple(q[link[name]].tolist()))
-        if len(ends) == 2:
-            found.setdefault((ends[0], ends[1]), int(link["seq"]))
-            found.setdefault((ends[1], ends[0]), int(link["seq"]))
+    for link in context.events[Kind.CONNECT] if {0, 1} <= trees.keys() else ():
+        start, goal = int(link["node"]), int(link["other"])
+        if 0 <= start < len(trees[0]) and 0 <= goal < len(trees[1]):
+            a, b = (tuple(q.tolist()) for q in (trees[0].q[start], trees[1].q[goal]))
+            found.setdefault((a, b), int(link["seq"]))
+            found.setdefault((b, a), int(link["seq"]))
     return found
 
 
-def shortcuts(context: Context, result: RuleResult) -> None:
-    """Shortcuts replace what lies between two waypoints by a free motion; the cost never rises."""
-    table = context.events[Kind.SHORTCUT]
-    path, cost, due = np.empty((0, context.dof)), np.inf, list(context.found)
-    for event in table:
-        while due and due[0][0]["seq"] < event["seq"]:
-            first, path = due.pop(0)
-            cost = float(first["cost"])
-        wrong, path = _attempt(context, event, path, cost)
-        result.one(event, wrong)
-        cost = float(event["cost"])
+class Shortcuts(Rule):
+    name = "shortcuts"
+    promise = "Shortcuts replace what is between two waypoints by a free motion, at no more cost."
+
+    def finish(self) -> None:
+        path, cost, due = np.empty((0, self.context.dof)), np.inf, self.context.planned_paths
+        for event in self.context.events[Kind.SHORTCUT]:
+            while due and due[0][0]["seq"] < event["seq"]:
+                first, path = due.pop(0)
+                cost = float(first["cost"])
+            wrong, path = self._attempt(event, path, cost)
+            self.judge_one(event, wrong)
+            cost = float(event["cost"])
+
+    def _attempt(self, event: Any, path: Floats, cost: float) -> tuple[str | None, Floats]:
+        """Make an attempt; return what is wrong with it, and the path after it."""
+        context, i, j, after = self.context, int(event["i"]), int(event["j"]), float(event["cost"])
+        if not 0 <= i < j < len(path):
+            return f"waypoints {i} and {j} are not a pair of a path of {len(path)}", path
+        if event["accepted"]:
+            hit = int(context.first_hits(path[i][None], path[j][None])[0])
+            if hit >= 0:
+                return (
+                    f"the motion from waypoint {i} to {j} hits {context.obstacles.name(hit)}",
+                    path,
+                )
+            path = np.concatenate([path[: i + 1], path[j:]])
+        length = np.asarray(context.distance(path[:-1], path[1:]).sum())
+        if not after <= cost * (1 + 1e-12):
+            return f"the cost rises from {cost:.12g} to {after:.12g}", path
+        if not context.equal(np.asarray(after), length):
+            return f"the cost is {after:.12g}; the length, {length:.12g}", path
+        return None, path
 
 
-def _attempt(context: Context, event: Any, path: Floats, cost: float) -> tuple[str | None, Floats]:
-    """Make one attempt; return what is wrong with it, and the path after it."""
-    i, j = int(event["i"]), int(event["j"])
-    if not 0 <= i < j < len(path):
-        return f"waypoints {i} and {j} are no pair of a path with {len(path)}", path
-    if event["accepted"] and (hit := int(context.blocked(path[i][None], path[j][None])[0])) >= 0:
-        name = context.obstacles.name(hit)
-        return f"the motion from waypoint {i} to {j} hits {name}", path
-    if event["accepted"]:
-        path = np.concatenate([path[: i + 1], path[j:]])
-    after = float(event["cost"])
-    length = np.asarray(context.distance(path[:-1], path[1:]).sum())
-    if not after <= cost * (1 + 1e-12):
-        return f"the cost rises from {cost:.12g} to {after:.12g}", path
-    if not context.same(np.asarray(after), length):
-        return f"said to cost {after:.12g}; the path is {length:.12g} long", path
-    return None, path
+class Smoothed(Rule):
+    name = "smoothed"
+    promise = "The smoother reports one path, what the accepted shortcuts leave, at no more cost."
+
+    def finish(self) -> None:
+        for event, raw, path, attempts in self._smoothed():
+            wrong = None
+            if raw is None:
+                wrong = "there is no path to smooth"
+            elif not float(event["cost"]) <= raw[0] * (1 + 1e-12):
+                wrong = f"costs {event['cost']:.12g}, more than {raw[0]:.12g} before"
+            elif not np.array_equal(_shortened(raw[1], attempts), path):
+                wrong = "not the path that the shortcuts leave"
+            self.judge_one(event, wrong)
+        phases = self.context.events[Kind.PHASE]
+        ends = phases[(phases["name"] == Phase.SMOOTH) & (phases["status"] != Status.BEGIN)]
+        count = sum(event["stage"] == Stage.SMOOTHED for event, _ in self.context.paths)
+        if len(ends) and count != len(ends):
+            self.judge_one(ends[-1], f"the smoother has reported {count} paths, not {len(ends)}")
+
+    def _smoothed(self) -> Iterator[tuple[Any, tuple[float, Floats] | None, Floats, Table]]:
+        """Yield each smoothed path: event, cost and waypoints before, waypoints, attempts."""
+        table, raw, done = self.context.events[Kind.SHORTCUT], None, 0
+        for event, path in self.context.paths:
+            if event["stage"] == Stage.SMOOTHED:
+                end = int(np.searchsorted(table["seq"], event["seq"]))
+                yield event, raw, path, table[done:end]
+                done = end
+            else:
+                raw = float(event["cost"]), path
 
 
-def smoothed(context: Context, result: RuleResult) -> None:
-    """One smoothed path is told: what the accepted shortcuts leave; it costs no more."""
-    table, raw = context.events[Kind.SHORTCUT], None
-    done = 0
-    for event, path in context.paths:
-        if event["stage"] != Stage.SMOOTHED:
-            raw = (float(event["cost"]), path)
-            continue
-        end = int(np.searchsorted(table["seq"], event["seq"]))
-        attempts, done = table[done:end], end
-        if raw is None:
-            result.one(event, "there was no path to smooth")
-            continue
-        left = _shortened(raw[1], attempts)
-        wrong = None if np.array_equal(left, path) else "not the path that the shortcuts leave"
-        if not float(event["cost"]) <= raw[0] * (1 + 1e-12):
-            wrong = f"costs {event['cost']:.12g}, more than {raw[0]:.12g} before"
-        result.one(event, wrong)
-    phases = context.events[Kind.PHASE]
-    ends = phases[(phases["name"] == Phase.SMOOTH) & (phases["status"] != Status.BEGIN)]
-    told = sum(event["stage"] == Stage.SMOOTHED for event, _ in context.paths)
-    if len(ends) and told != len(ends):
-        result.one(ends[-1], f"the smoother has told {told} paths, not one")
-
-
-def _shortened(path: Floats, attempts: NDArray[np.void]) -> Floats:
+def _shortened(path: Floats, attempts: Table) -> Floats:
     """Make the accepted shortcuts that can be made."""
     for event in attempts[attempts["accepted"]]:
         i, j = int(event["i"]), int(event["j"])
@@ -216,7 +238,4 @@ def _shortened(path: Floats, attempts: NDArray[np.void]) -> Floats:
     return path
 
 
-RULES = (
-    path_ends, paths_free, path_costs, paths_improve, paths_in_trees, shortcuts, smoothed,
-)  # fmt: skip
-"""All rules of this file; see `brrt.verification`."""
+RULES = (PathEnds, PathsFree, PathCosts, PathsImprove, PathsInTrees, Shortcuts, Smoothed)

@@ -1,32 +1,35 @@
-"""Rules about searches on a lattice: best first, by shortest ways, to the goal or to the end."""
+"""Rules about searches on a lattice: best first, by shortest paths, to the goal or to the end."""
 
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.collision.motions import all_clear
 from brrt.events import Kind, Status, Table
+from brrt.replay.text import vector
 from brrt.scenario.contract import Lattice
-from brrt.verification.context import CLOSE, Context
-from brrt.verification.result import RuleResult
-from brrt.verification.rules.lattice import adjacent, indices, lattice_of
-from brrt.verification.rules.log import text
+from brrt.collision.motions import all_clear
+from brrt.verification.context import Context
+from brrt.verification.rule import LatticeRule
+from brrt.verification.rules.lattice import adjacent, indices
+from brrt.verification.tolerances import CLOSE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+Keys = NDArray[np.uint64]
+Step = tuple[int, ...]
 
 _BITS = 21
 
 MOST = 2000
-"""Of more cells than this, so many are looked at, evenly spread over the log."""
+"""Cells whose neighbours are judged, spread over the log."""
 
 
 def _estimates(context: Context, table: Table) -> Floats:
-    """Estimates of the cost-to-go of cells as they stood when they were expanded, shape (n,)."""
+    """Return the estimates of the cost-to-go of cells when they were expanded, shape (n,)."""
     raised = context.events[Kind.HEURISTIC]
-    h = context.distance(np.asarray(table["q"]), context.goal[None])
+    h = context.distance(table["q"], context.goal[None])
     if not len(raised):
         return h
     cell = np.concatenate([raised["cell"], table["cell"]])
@@ -39,203 +42,200 @@ def _estimates(context: Context, table: Table) -> Floats:
     return h
 
 
-def best_first(context: Context, result: RuleResult) -> None:
-    """A search expands cells in the order of their cost and estimate together."""
-    table = context.events[Kind.EXPAND]
-    if lattice_of(context) is None or not len(table):
-        return
-    f = table["cost"] + _estimates(context, table)
-    before = np.append(-np.inf, f[:-1])
-    before[table["parent"] < 0] = -np.inf
-    result.look(
-        table, ~context.at_most(before, f),
-        lambda i: f"cell {table['cell'][i]} at {f[i]:.12g} after one at {before[i]:.12g}",
-    )  # fmt: skip
+class BestFirst(LatticeRule):
+    name = "best first"
+    promise = "A search expands cells in the order of the sum of their cost and estimate."
+
+    def judge_search(self, lattice: Lattice, table: Table) -> None:
+        total = table["cost"] + _estimates(self.context, table)
+        before = np.append(-np.inf, total[:-1])
+        before[table["parent"] < 0] = -np.inf
+        self.judge(
+            table, ~self.context.at_most(before, total),
+            lambda i: f"cell {table['cell'][i]} at {total[i]:.12g} after one at {before[i]:.12g}",
+        )  # fmt: skip
 
 
-def _keys(places: Ints) -> Ints:
-    """One number for each place on the lattice, by which it is found, shape (n,)."""
-    keys = np.zeros(len(places), np.int64)
-    for k in range(places.shape[1]):
-        keys = keys << _BITS | np.clip(places[:, k] + (1 << _BITS - 1), 0, (1 << _BITS) - 1)
+def _steps(lattice: Lattice, dim: int) -> list[Step]:
+    """Return the steps from a cell to its neighbours."""
+    steps = [step for step in product((-1, 0, 1), repeat=dim) if any(step)]
+    return [step for step in steps if lattice.diagonals or sum(map(abs, step)) == 1]
+
+
+def _cell_keys(cells: Ints) -> Ints:
+    """Return a number for each cell, by its integer coordinates, shape (n,)."""
+    keys = np.zeros(len(cells), np.int64)
+    for k in range(cells.shape[1]):
+        keys = keys << _BITS | np.clip(cells[:, k] + (1 << _BITS - 1), 0, (1 << _BITS) - 1)
     return keys
 
 
-def _motions(number: Ints, keys: Ints) -> NDArray[np.uint64]:
-    """One number for each motion from a cell to a place, shape (n,)."""
+def _motion_keys(number: Ints, cell_keys: Ints) -> Keys:
+    """Return a number for each motion from a numbered cell to another cell, shape (n,)."""
     mixed = number.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    return (mixed ^ keys.astype(np.uint64)) * np.uint64(0xC2B2AE3D27D4EB4F)
+    return (mixed ^ cell_keys.astype(np.uint64)) * np.uint64(0xC2B2AE3D27D4EB4F)
+
+
+def _contains(keys: Keys, wanted: Keys) -> Flags:
+    """Return which numbers are among sorted keys, shape (n,)."""
+    if not len(keys):
+        return np.zeros(len(wanted), bool)
+    return np.asarray(keys[np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)] == wanted)
 
 
 class _Expanded:
-    """Cells that were expanded, each once, and what was found to be blocked between them.
+    """The cells that were expanded, each once, and the motions between them that are blocked.
 
     Attributes:
-        born: Where each first stands among all expansions, shape (n,); cells lie in the order of
-            their places, so that neighbours are found without leaping about in memory.
+        born: Where each first occurs among all expansions, shape (n,). The cells are sorted by
+            place, so that neighbours are close in memory.
         table: Its expansion then.
-        steps: To a cell's neighbours.
     """
 
     def __init__(self, context: Context, lattice: Lattice) -> None:
         table, rejects = context.events[Kind.EXPAND], context.events[Kind.REJECT]
-        keys = _keys(indices(context, lattice, table["q"]))
+        keys = _cell_keys(indices(context, lattice, table["q"]))
         self._keys, self.born = np.unique(keys, return_index=True)
         self.table = table[self.born]
-        gone = _keys(indices(context, lattice, rejects["q"]))
-        self._blocked = np.unique(_motions(rejects["node"].astype(np.int64), gone))
-        dim = table["q"].shape[1]
-        steps = [s for s in product((-1, 0, 1), repeat=dim) if any(s)]
-        self.steps = [s for s in steps if lattice.diagonals or sum(map(abs, s)) == 1]
+        targets = _cell_keys(indices(context, lattice, rejects["q"]))
+        self._blocked = np.unique(_motion_keys(rejects["node"].astype(np.int64), targets))
 
-    def neighbours(self, step: tuple[int, ...]) -> tuple[Ints, Flags]:
-        """For each cell the row of its neighbour or -1, and whether the way there is open."""
+    def neighbours(self, step: Step) -> tuple[Ints, Flags]:
+        """Return for each cell the row of its neighbour or -1, and whether the motion is free."""
         wanted = self._keys + sum(x << _BITS * (len(step) - 1 - k) for k, x in enumerate(step))
         other = np.minimum(np.searchsorted(self._keys, wanted), len(wanted) - 1)
         other = np.where(self._keys[other] == wanted, other, -1)
-        shut = self._is_blocked(_motions(self.table["cell"].astype(np.int64), wanted))
-        back = _motions(self.table["cell"][other].astype(np.int64), self._keys)
-        return other, ~shut & ((other < 0) | ~self._is_blocked(back))
-
-    def _is_blocked(self, motions: NDArray[np.uint64]) -> Flags:
-        if not len(self._blocked):
-            return np.zeros(len(motions), bool)
-        at = np.minimum(np.searchsorted(self._blocked, motions), len(self._blocked) - 1)
-        return np.asarray(self._blocked[at] == motions)
+        numbers = self.table["cell"].astype(np.int64)
+        blocked = _contains(self._blocked, _motion_keys(numbers, wanted))
+        back = _contains(self._blocked, _motion_keys(numbers[other], self._keys))
+        return other, ~blocked & ((other < 0) | ~back)
 
     def in_order(self) -> Ints:
-        """Rows in the order in which they were expanded."""
+        """Return the rows in the order of the log."""
         return np.argsort(self.born)
 
 
-def shortest_ways(context: Context, result: RuleResult) -> None:
-    """Where no robot moves meanwhile, no cell is reached cheaper over a neighbour expanded before.
+class ShortestPaths(LatticeRule):
+    name = "shortest paths"
+    promise = (
+        "If no robot moves meanwhile, no cell is reached at less cost from a neighbour that was "
+        "expanded before."
+    )
 
-    So, as cells are expanded best first, each is reached by a shortest way on the lattice.
-    """
-    lattice = lattice_of(context)
-    if lattice is None or lattice.lookahead is not None or not len(context.events[Kind.EXPAND]):
-        return
-    cells = _Expanded(context, lattice)
-    cost = np.asarray(cells.table["cost"])
-    least = np.full(len(cost), np.inf)
-    for step in cells.steps:
-        other, is_open = cells.neighbours(step)
-        there = is_open & (other >= 0) & (cells.born[other] < cells.born)
-        through = cost[other] + lattice.epsilon * sum(map(abs, step)) ** 0.5
-        least = np.where(there, np.minimum(least, through), least)
-    order = cells.in_order()
-    table, cost, least = cells.table[order], cost[order], least[order]
-    result.look(
-        table, ~context.at_most(cost, least),
-        lambda i: f"cell {table['cell'][i]} costs {cost[i]:.12g}; {least[i]:.12g} is a way",
-    )  # fmt: skip
-
-
-def nothing_left(context: Context, result: RuleResult) -> None:
-    """Where it is proved that there is no path, all that can be reached was looked at."""
-    lattice = lattice_of(context)
-    if (
-        lattice is None
-        or context.outcome is not Status.NO_PATH
-        or not len(context.events[Kind.EXPAND])
-    ):
-        return
-    cells = _Expanded(context, lattice)
-    wrong = np.zeros(len(cells.table), bool)
-    for step in cells.steps:
-        other, is_open = cells.neighbours(step)
-        wrong |= is_open & (other < 0)
-    order = cells.in_order()
-    table = cells.table[order]
-    result.look(
-        table, wrong[order],
-        lambda i: f"cell {table['cell'][i]} has a neighbour that nobody looked at",
-    )  # fmt: skip
+    def judge_search(self, lattice: Lattice, table: Table) -> None:
+        if lattice.lookahead is not None:
+            return
+        cells = _Expanded(self.context, lattice)
+        cost = np.asarray(cells.table["cost"])
+        least = np.full(len(cost), np.inf)
+        for step in _steps(lattice, self.context.dof):
+            other, is_free = cells.neighbours(step)
+            exists = is_free & (other >= 0) & (cells.born[other] < cells.born)
+            through = cost[other] + lattice.epsilon * sum(map(abs, step)) ** 0.5
+            least = np.where(exists, np.minimum(least, through), least)
+        order = cells.in_order()
+        first, cost, least = cells.table[order], cost[order], least[order]
+        self.judge(
+            first, ~self.context.at_most(cost, least),
+            lambda i: f"cell {first['cell'][i]} costs {cost[i]:.12g}; a way costs {least[i]:.12g}",
+        )  # fmt: skip
 
 
-def neighbours(context: Context, result: RuleResult) -> None:
-    """Of the cells around one that is looked at, those are turned down that cannot be reached.
+class SearchExhausted(LatticeRule):
+    name = "search exhausted"
+    promise = "Before a search reports that there is no path, it expands all that it can reach."
 
-    All rejections are looked at, and of many cells 2,000.
-    """
-    lattice = lattice_of(context)
-    table, rejects = context.events[Kind.EXPAND], context.events[Kind.REJECT]
-    if lattice is None or not len(table):
-        return
-    places, gone = (indices(context, lattice, some["q"]) for some in (table, rejects))
-    motions = _motions(rejects["node"].astype(np.int64), _keys(gone))
-    again = np.ones(len(rejects), bool)
-    again[np.unique(motions, return_index=True)[1]] = False
-    last = np.searchsorted(table["seq"], rejects["seq"]) - 1
-    q = np.asarray(rejects["q"])
-    off = np.abs(q - context.start - lattice.epsilon * gone).max(axis=1, initial=0)
-    wrong = again | (last < 0) | (table["cell"][last] != rejects["node"])
-    wrong |= ~adjacent(lattice, places[last], gone)
-    wrong |= ~(off <= CLOSE * lattice.epsilon + context.blur)
-    result.look(
-        rejects, wrong,
-        lambda i: (
-            f"{text(q[i])} is turned down again" if again[i]
-            else f"{text(q[i])} is turned down, no neighbour of the cell just expanded"
-        ),
-    )  # fmt: skip
-    _look_open(context, result, lattice, np.unique(motions))
+    def judge_search(self, lattice: Lattice, table: Table) -> None:
+        if self.context.outcome is not Status.NO_PATH:
+            return
+        cells = _Expanded(self.context, lattice)
+        wrong = np.zeros(len(cells.table), bool)
+        for step in _steps(lattice, self.context.dof):
+            other, is_free = cells.neighbours(step)
+            wrong |= is_free & (other < 0)
+        order = cells.in_order()
+        first = cells.table[order]
+        self.judge(
+            first, wrong[order],
+            lambda i: f"cell {first['cell'][i]} has a neighbour that was not expanded",
+        )  # fmt: skip
 
 
-def _look_open(
-    context: Context, result: RuleResult, lattice: Lattice, blocked: NDArray[np.uint64]
-) -> None:
-    """See that what was not turned down can be reached."""
-    table = context.events[Kind.EXPAND]
-    table = table[: len(table) - context.cut]
-    table = table[np.sort(np.unique(table["cell"], return_index=True)[1])]
-    # Where the goal is in reach nobody looks around.
-    far = context.distance(np.asarray(table["q"]), context.goal[None])
-    table = table[~context.at_most(far, lattice.max_move)]
-    if not len(table):
-        return
-    table = table[np.linspace(0, len(table) - 1, min(MOST, len(table))).astype(np.int64)]
-    steps = np.array([s for s in product((-1, 0, 1), repeat=context.dof) if any(s)])
-    if not lattice.diagonals:
-        steps = steps[np.abs(steps).sum(axis=1) == 1]
-    around = (indices(context, lattice, table["q"])[:, None] + steps).reshape(-1, context.dof)
-    some = np.repeat(table, len(steps))
-    is_open = ~np.isin(_motions(some["cell"].astype(np.int64), _keys(around)), blocked)
-    some, to = some[is_open], context.start + lattice.epsilon * around[is_open]
-    out = ~((context.lower - context.blur <= to) & (to <= context.upper + context.blur)).all(axis=1)
-    hit = out | (context.blocked(np.asarray(some["q"]), to) >= 0)
-    result.look(
-        some, hit,
-        lambda i: f"cell {some['cell'][i]}: {text(to[i])} is not turned down, but out of reach",
-    )  # fmt: skip
+class CellNeighbours(LatticeRule):
+    name = "neighbours"
+    promise = "Of the neighbours of an expanded cell, those that cannot be reached are rejected."
+
+    def judge_search(self, lattice: Lattice, table: Table) -> None:
+        context, rejects = self.context, self.context.events[Kind.REJECT]
+        cells, targets = (indices(context, lattice, some["q"]) for some in (table, rejects))
+        motions = _motion_keys(rejects["node"].astype(np.int64), _cell_keys(targets))
+        again = np.ones(len(rejects), bool)
+        again[np.unique(motions, return_index=True)[1]] = False
+        last = np.searchsorted(table["seq"], rejects["seq"]) - 1
+        off = np.abs(rejects["q"] - context.start - lattice.epsilon * targets)
+        wrong = again | (last < 0) | (table["cell"][last] != rejects["node"])
+        wrong |= ~adjacent(lattice, cells[last], targets)
+        wrong |= ~(off.max(axis=1, initial=0) <= CLOSE * lattice.epsilon + context.tolerance)
+        self.judge(
+            rejects, wrong,
+            lambda i: (
+                f"{vector(rejects['q'][i])} is rejected again" if again[i]
+                else f"{vector(rejects['q'][i])} is rejected, no neighbour of the last expanded cell"
+            ),
+        )  # fmt: skip
+        self._judge_reachable(lattice, table, np.unique(motions))
+
+    def _judge_reachable(self, lattice: Lattice, table: Table, blocked: Keys) -> None:
+        """Judge whether neighbours that were not rejected can be reached."""
+        context = self.context
+        table = table[: len(table) - context.is_cut]
+        table = table[np.sort(np.unique(table["cell"], return_index=True)[1])]
+        # Within a move of the goal neighbours are not examined.
+        far = context.distance(table["q"], context.goal[None])
+        table = table[~context.at_most(far, lattice.max_move)]
+        if not len(table):
+            return
+        table = table[np.linspace(0, len(table) - 1, min(MOST, len(table))).astype(np.int64)]
+        steps = np.array(_steps(lattice, context.dof))
+        around = indices(context, lattice, table["q"])[:, None] + steps
+        around = around.reshape(-1, context.dof)
+        table = np.repeat(table, len(steps))
+        keys = _motion_keys(table["cell"].astype(np.int64), _cell_keys(around))
+        rest = ~_contains(blocked, keys)
+        table, to = table[rest], context.start + lattice.epsilon * around[rest]
+        low, high = context.lower - context.tolerance, context.upper + context.tolerance
+        out = ~((low <= to) & (to <= high)).all(axis=1)
+        self.judge(
+            table, out | (context.first_hits(table["q"], to) >= 0),
+            lambda i: f"cell {table['cell'][i]}: {vector(to[i])} is out of reach but not rejected",
+        )  # fmt: skip
 
 
-def goal_taken(context: Context, result: RuleResult) -> None:
-    """Where the goal is within a straight free move of a cell, the search ends there."""
-    lattice, table = lattice_of(context), context.events[Kind.EXPAND]
-    if lattice is None or not len(table):
-        return
-    q = np.asarray(table["q"])
-    far = context.distance(q, context.goal[None])
-    near = np.flatnonzero(far < lattice.max_move * (1 - CLOSE) - context.blur)
-    some, a = table[near], q[near]
-    clear = all_clear(context.obstacles, context.robot, a, np.broadcast_to(context.goal, a.shape))
-    ends = np.append(table["seq"][1:], 1 << 62)
-    # Who goes on with another lookahead plans anew.
-    ends[:-1][np.diff(context.stretch(table)) > 0] = 1 << 62
-    ends = ends[near]
-    moves = context.events[Kind.MOVE]
-    # From a cell at the goal there is no move to make; the path is told all the same.
-    moved = moves["seq"][(np.asarray(moves["q"]) == context.goal).all(axis=1)]
-    taken = np.sort(np.concatenate([moved, context.events[Kind.PATH]["seq"]]))
-    next_ = np.append(taken, 1 << 61)[np.searchsorted(taken, some["seq"])]
-    wrong = clear & (ends < 1 << 62) & (next_ > ends)
-    result.look(
-        some, np.asarray(wrong),
-        lambda i: f"cell {some['cell'][i]} is {far[near[i]]:.9g} from the goal; the search goes on",
-    )  # fmt: skip
+class GoalReached(LatticeRule):
+    name = "goal reached"
+    promise = "If the goal is within a straight free move of a cell, the search ends there."
+
+    def judge_search(self, lattice: Lattice, table: Table) -> None:
+        context = self.context
+        far = context.distance(table["q"], context.goal[None])
+        near = np.flatnonzero(far < lattice.max_move * (1 - CLOSE) - context.tolerance)
+        cells, far = table[near], far[near]
+        a = np.asarray(cells["q"])
+        goals = np.broadcast_to(context.goal, a.shape)
+        clear = all_clear(context.obstacles, context.robot, a, goals)
+        ends = np.append(table["seq"][1:], 1 << 62)
+        # A branch with another lookahead searches again.
+        ends[:-1][np.diff(context.stretch(table)) > 0] = 1 << 62
+        ends = ends[near]
+        moves = context.events[Kind.MOVE]
+        # From a cell at the goal there is no move to make, but the path is reported.
+        moved = moves["seq"][(moves["q"] == context.goal).all(axis=1)]
+        reached = np.sort(np.concatenate([moved, context.events[Kind.PATH]["seq"]]))
+        following = np.append(reached, 1 << 61)[np.searchsorted(reached, cells["seq"])]
+        self.judge(
+            cells, np.asarray(clear & (ends < 1 << 62) & (following > ends)),
+            lambda i: f"cell {cells['cell'][i]} is {far[i]:.9g} from the goal; the search goes on",
+        )  # fmt: skip
 
 
-RULES = (neighbours, best_first, shortest_ways, nothing_left, goal_taken)
-"""All rules of this file; see `brrt.verification`."""
+RULES = (CellNeighbours, BestFirst, ShortestPaths, SearchExhausted, GoalReached)

@@ -1,0 +1,137 @@
+"""`verify`: judge a recording by all rules."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from brrt.events import Events, Kind
+from brrt.recording import Recording
+from brrt.scenario.contract import Contract
+from brrt.verification.context import Context
+from brrt.verification.result import Finding, RuleResult
+from brrt.verification.rule import ANY_PART, Rule
+from brrt.verification.rules import RULES
+
+_WINDOW = 100_000
+"""Events that rules judge together, at least."""
+
+_PARTS = {Kind.SAMPLE: "samples", Kind.EDGE: "edges", Kind.EXPAND: "expanded cells"}
+"""Kinds of events without which a planner's work cannot be judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What the rules found.
+
+    Attributes:
+        results: What each rule found; one without anything to judge has examined nothing.
+        not_judged: Names of rules that the recording gives nothing to judge by, for each reason.
+        has_contract: Whether there is a contract; without one only what all planners promise is
+            judged.
+        is_cut: Whether the run's end is missing; then no rule judges it.
+    """
+
+    results: list[RuleResult]
+    not_judged: Mapping[str, list[str]]
+    has_contract: bool
+    is_cut: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether no rule is broken."""
+        return not any(result.broken for result in self.results)
+
+    @property
+    def findings(self) -> list[Finding]:
+        """The findings that each rule kept, in the order of their events."""
+        found = [finding for result in self.results for finding in result.findings]
+        return sorted(found, key=lambda finding: finding.seq)
+
+
+def verify(recording: Recording, *, contract: Contract | None = None) -> Verification:
+    """Judge a recording by all rules.
+
+    Args:
+        recording: The recording; if its `result` is None, the run's end is not judged.
+        contract: What the planner promises; by default what the recording states, or else the
+            registered planner of that name; without either only what all planners promise.
+
+    Raises:
+        BrrtError: Start or goal is not free in the world, or the recording is damaged.
+    """
+    context = Context(recording, contract)
+    rules = [rule(context) for rule in RULES]
+    active = [rule for rule in rules if _applies(rule)]
+    firsts = [first for first, _ in context.stretches[1:]]
+    with np.errstate(all="ignore"):  # a log may hold any numbers
+        for events in _windows(recording.batches(), firsts):
+            contract_now = context.advance(events)
+            for rule in active:
+                rule.window(events, contract_now)
+        context.end()
+        for rule in active:
+            rule.finish()
+    results = [rule.result for rule in rules]
+    return Verification(results, _not_judged(rules), context.has_contract, context.is_cut)
+
+
+def _windows(batches: Iterable[Events], firsts: list[int]) -> Iterator[Events]:
+    """Yield the events in windows that are large enough to be judged fast, and never empty.
+
+    Args:
+        batches: The log.
+        firsts: Numbers of events that begin a window in any case, in order.
+    """
+    waiting: list[Events] = []
+    for batch in batches:
+        waiting.append(batch)
+        if sum(map(len, waiting)) >= _WINDOW:
+            yield from _split(Events.concat(batch.dof, waiting), firsts)
+            waiting = []
+    if sum(map(len, waiting)):
+        last = waiting[0] if len(waiting) == 1 else Events.concat(waiting[0].dof, waiting)
+        yield from _split(last, firsts)
+
+
+def _split(window: Events, firsts: list[int]) -> Iterator[Events]:
+    """Split a window before events of these numbers."""
+    for low, high in pairwise([-np.inf, *firsts, np.inf]):
+        tables = window.tables
+        if firsts:
+            tables = {k: t[(low <= t["seq"]) & (t["seq"] < high)] for k, t in tables.items()}
+        part = Events(window.dof, {kind: table for kind, table in tables.items() if len(table)})
+        if len(part):
+            yield part
+
+
+def _applies(rule: Rule) -> bool:
+    """Whether the planner promises what a rule judges."""
+    if rule.needs in ("", ANY_PART):
+        return not rule.needs or rule.context.has_contract
+    return any(getattr(contract, rule.needs) is not None for _, contract in rule.context.stretches)
+
+
+def _not_judged(rules: list[Rule]) -> dict[str, list[str]]:
+    """Return the names of the rules that could not judge, for each reason."""
+    found: dict[str, list[str]] = {}
+    for rule in rules:
+        reason = None if rule.result.examined else _reason(rule)
+        if reason is not None:
+            found.setdefault(reason, []).append(rule.name)
+    return found
+
+
+def _reason(rule: Rule) -> str | None:
+    """Return why a rule that has examined nothing could not judge; None if that is in order."""
+    context = rule.context
+    if rule.needs and not context.has_contract:
+        return "no contract"
+    if rule.of_end and context.is_cut:
+        return "the run's end is missing"
+    if rule.kind not in _PARTS or rule.kind in context.kept.kinds or not _applies(rule):
+        return None
+    # Searches on a lattice need no trees.
+    searches = context.contract.lattice is not None or Kind.EXPAND in context.kept.kinds
+    return f"no {_PARTS[rule.kind]}" if rule.needs or not searches else None
