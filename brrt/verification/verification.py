@@ -132,6 +132,7 @@ def _reason(rule: Rule) -> str | None:
         return "the run's end is missing"
     if rule.kind not in _PARTS or rule.kind in context.kept.kinds or not _applies(rule):
         return None
-    # Searches on a lattice need no trees.
     searches = context.contract.lattice is not None or Kind.EXPAND in context.kept.kinds
-    return f"no {_PARTS[rule.kind]}" if rule.needs or not searches else None
+    if searches and rule.kind is not Kind.EXPAND:  # on a lattice, without samples and trees
+        return None
+    return f"no {_PARTS[rule.kind]}"

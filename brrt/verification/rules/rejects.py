@@ -87,7 +87,9 @@ class Reasons(Rule):
         right &= (why != Reason.NO_GAIN) | (through >= best * (1 - CLOSE) - context.tolerance)
         right &= (why != Reason.GOAL_BLOCKED) | (q == context.goal).all(axis=1)
         self.judge(
-            table, ~right, lambda i: f"{Reason.label_of(int(why[i]))} cannot be why {vector(q[i])} is rejected"
+            table,
+            ~right,
+            lambda i: f"{vector(q[i])} cannot be rejected for {Reason.label_of(int(why[i]))}",
         )
         self.kept.add(table[np.isin(why, _BY_TREES)])
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Source, Table
-from brrt.robots import Point
 from brrt.replay.text import vector
+from brrt.robots import Point
 from brrt.scenario.contract import Contract, Draws
 from brrt.verification.context import Context
 from brrt.verification.draws import Drawn

@@ -180,7 +180,7 @@ class CellNeighbours(LatticeRule):
             rejects, wrong,
             lambda i: (
                 f"{vector(rejects['q'][i])} is rejected again" if again[i]
-                else f"{vector(rejects['q'][i])} is rejected, no neighbour of the last expanded cell"
+                else f"{vector(rejects['q'][i])} is no neighbour of the last expanded cell"
             ),
         )  # fmt: skip
         self._judge_reachable(lattice, table, np.unique(motions))

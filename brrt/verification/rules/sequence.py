@@ -72,6 +72,8 @@ class Extensions(IterationRule):
 
     def judge_rows(self, rows: Table, contract: Contract, growth: Growth, *, last: bool) -> None:
         rewires = contract.near is not None
+        if not (rows["kind"] == Kind.SAMPLE).any():
+            return
         if len(rows) < 2 or (not rewires and growth.links is not None):  # see `link attempts`
             return
         rows = rows if last else followed(rows)

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind, Table
 from brrt.replay.forest import reason
-from brrt.replay.tree_fold import VALID
 from brrt.replay.text import vector
+from brrt.replay.tree_fold import VALID
 from brrt.verification.rule import Rule, TreeRule
 from brrt.verification.tree_history import TreeHistory
 
