@@ -1,15 +1,15 @@
-"""Doctor sound recordings, one event at a time, and see which share of the lies is found.
+"""Change correct recordings, one event at a time, and count how many changes are found.
 
     python benchmarks/doctor.py [--runs 70] [--each 3] [--seed 0] [--robot KIND] [--show X.WAY]
 
-Runs are drawn as benchmarks/soak.py draws them, those that say between 60 and 2,500 events. In each
-a random event of each kind is doctored in each way: a number off by a thousandth, another node,
-tree, source, reason, stage or status, the iteration before or after; or the event is dropped, told
-twice, or told after the next one, the others closing up, so that numbers and times are as they
-should be. It prints a table: for each kind and way, how many of the doctored logs `verify` finds
-fault with. Not all are lies: a planner may have drawn another sample that leads to the same edge.
+Runs are drawn as by benchmarks/soak.py, those of 60 to 2,500 events. In each a random event of
+each kind is doctored in each way: a number off by a thousandth, another node, tree, source,
+reason, stage or status, the iteration before or after; or the event is dropped, duplicated, or
+swapped with the next one, and the others are numbered anew, so that numbers and times are right.
+It prints a table: for each kind and way, how many of the changed logs break a rule. Not all are
+wrong: a planner may have drawn another sample that leads to the same edge.
 
-`--show edge.parent` prints those of a cell of the table that nobody found, with the run's command.
+`--show edge.parent` prints those of a cell of the table that no rule found, with the command.
 """
 
 import argparse
@@ -23,8 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from brrt import Events, Kind, Memory, Run, Scenario
-from brrt.verification import examine
+from brrt import Events, Kind, Memory, Recording, Run, Scenario, verify
 from tests.support.doctoring import doctors
 from tests.support.scenarios import PLANNERS, ROBOTS, SEARCHES, command, draw
 
@@ -33,8 +32,8 @@ LEAST, MOST = 60, 2500
 
 
 def found(run: Run, log: Events) -> bool:
-    """Whether any rule finds fault with a log."""
-    return any(tally.broken for tally in examine(run.manifest, run.problem.world, log))
+    """Whether a log breaks any rule."""
+    return not verify(Recording(run.manifest, run.problem.world, lambda: [log], {})).holds
 
 
 def runs(
@@ -57,14 +56,14 @@ def runs(
 
 
 def show(scenario: Scenario, kind: Kind, row: int, before: Events, after: Events) -> None:
-    """Print a log that nobody found fault with."""
+    """Print a changed log that breaks no rule."""
     print(f"{command(scenario)}\n  {kind.label} {row}: {before[kind][row]}")
     if len(before[kind]) == len(after[kind]):
         print(f"  {' ' * len(kind.label)} now: {after[kind][row]}")
 
 
 def main() -> int:
-    """Doctor them all; print the table."""
+    """Change all runs; print the table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from brrt import Events, Kind, McapSink, Problem, Run, Scenario, World, check, read
+from brrt import Events, Kind, McapSink, Problem, Run, Scenario, World, read, verify
 from brrt.formats.background import BackgroundSink
 from brrt.recording import Result
 
@@ -274,7 +274,7 @@ def valid(bench: Bench, cases: list[Case]) -> None:
         for seed in seeds:
             bench.ours(case, seed, "rrt")
             recording = read(bench.folder / "run.mcap")
-            ours += not check(recording.manifest, recording.world, recording.events())
+            ours += verify(recording).holds
         print(f"{case.name:44}{theirs:7}/{len(seeds)}{ours:7}/{len(seeds)}", flush=True)
 
 

@@ -1,34 +1,34 @@
-"""Hold random runs of every planner, robot and world to their promises, and their recordings too.
+"""Verify random runs of every planner, robot and world.
 
     python benchmarks/soak.py [--runs 3000] [--seed 0] [--folder soak]
 
-Run n is drawn from seed + n, so any of them can be drawn again: `--seed S --runs 1`. The checks are
-those of `brrt verify`, by code that is not the planners'. A finding is printed with the command
-that makes the run; the exit code is then 1. Robots and worlds that need a file are kept in the
-folder.
+Run n is drawn from seed + n, so any of them can be drawn again: `--seed S --runs 1`. The rules are
+those of `brrt verify`. A finding is printed with the command that makes the run; the exit code is
+then 1. Robots and worlds that need a file are kept in the folder.
 
-Rules about draws accuse one sound run in a million at most, which no soak can see; so each run is
-also judged by them as if that were one in 20, and the share of those that are accused is printed.
-It must not be above that, but for chance: else the exit code is 1.
+Rules about draws falsely accuse at most one recording in a million, which no soak can see; so each
+run is also judged by them with a rate of false alarms of one in 20, and the share of accused runs
+is printed. If it is above that by more than chance, the exit code is 1.
 """
 
 import argparse
 import sys
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from brrt import Events, Memory, Run, Scenario, verification
-from brrt.verification import e_process, examine
+from brrt import Recording, Run, Scenario, verify
+from brrt.verification import e_process, verification
 from brrt.verification.rules import sampling
 from tests.support.scenarios import LINKS, PLANNERS, ROBOTS, command, draw
 
 LINE = "{:14} {:10} {:>7} {:>7} {:>10} {:>9}"
 EVERY = 100
 LOOSE = 0.05
-"""Chance of a false alarm that a soak can see."""
+"""A rate of false alarms that a soak can see."""
 
 
 def robot_of(run: Run) -> str:
@@ -39,36 +39,37 @@ def robot_of(run: Run) -> str:
     return f"chain {problem.dof}" if problem.robot.kind == "chain" else "polygon"
 
 
-def hold(scenario: Scenario, counts: dict[tuple[str, str], Counter[str]]) -> list[str]:
+def judge(scenario: Scenario, counts: dict[tuple[str, str], Counter[str]]) -> list[str]:
     """Run a scenario and count what became of it; return what it breaks."""
-    run, log = Run(scenario), Memory()
-    metrics = run.execute([log])
-    events = log.events()
-    tallies = examine(run.manifest, run.problem.world, events)
-    # What a run promises holds of its log as far as it goes, wherever it is cut.
-    part = events.until(seq=scenario.seed % len(events))
-    halves = examine(run.manifest, run.problem.world, part, cut=True)
+    run = Run(scenario)
+    recording = run.record()
+    log = recording.events()
+    # A cut log keeps the same promises, but for those of the end.
+    part = log.until(seq=scenario.seed % len(log))
+    cut = replace(recording, batches=lambda: [part], result=None)
+    results = [("", verify(recording).results)]
+    results += [(f"cut to {len(part)} events: ", verify(cut).results)]
     broken = [
-        f"{which}{tally.rule}: event {found.seq}: {found.message} ({tally.broken} such)"
-        for which, some in (("", tallies), (f"cut to {len(part)} events: ", halves))
-        for tally in some
-        for found in tally.findings[:1]
+        f"{which}{result.rule}: event {found.seq}: {found.message} ({result.broken} such)"
+        for which, some in results
+        for result in some
+        for found in result.findings[:1]
     ]
     count = counts.setdefault((scenario.planner, robot_of(run)), Counter())
-    count.update(runs=1, solved=metrics.as_dict()["solved"], events=len(events))
-    count.update(findings=sum(tally.broken for tally in [*tallies, *halves]))
-    count.update(accused=accused(run, events))
+    count.update(runs=1, solved=(recording.result or {})["solved"], events=len(log))
+    count.update(findings=sum(result.broken for _, some in results for result in some))
+    count.update(accused=accused(recording))
     return broken
 
 
-def accused(run: Run, events: Events) -> bool:
-    """Whether draws are found fault with where that may happen to one sound run in 20."""
-    rules, alarm = verification.RULES, e_process.ALARM
-    verification.RULES, e_process.ALARM = sampling.RULES, LOOSE
+def accused(recording: Recording) -> bool:
+    """Whether rules about draws are broken at a rate of false alarms of one in 20."""
+    rules, rate = verification.RULES, e_process.FALSE_ALARM
+    verification.RULES, e_process.FALSE_ALARM = sampling.RULES, LOOSE
     try:
-        return any(t.broken for t in examine(run.manifest, run.problem.world, events))
+        return not verify(recording).holds
     finally:
-        verification.RULES, e_process.ALARM = rules, alarm
+        verification.RULES, e_process.FALSE_ALARM = rules, rate
 
 
 def main() -> int:
@@ -86,8 +87,8 @@ def main() -> int:
     for n in range(args.runs):
         scenario = draw(args.seed + n, args.folder)
         try:
-            broken = hold(scenario, counts)
-        except Exception as error:  # noqa: BLE001 - a crash is a finding like any other
+            broken = judge(scenario, counts)
+        except Exception as error:  # noqa: BLE001 - a crash is a finding, too
             broken = [f"{type(error).__name__}: {error}"]
         if broken:
             bad += 1
@@ -99,7 +100,7 @@ def main() -> int:
     show(counts)
     alarms = sum(count["accused"] for count in counts.values())
     most = args.runs * LOOSE + 5 * (args.runs * LOOSE * (1 - LOOSE)) ** 0.5
-    print(f"draws of {alarms:,} runs are found fault with at one false alarm in {1 / LOOSE:.0f}")
+    print(f"draws of {alarms:,} runs are accused at one false alarm in {1 / LOOSE:.0f}")
     print(f"{args.runs:,} runs, {bad} with findings; links: {', '.join(map(str, LINKS))}")
     return int(bad > 0 or alarms > most)
 

@@ -4,22 +4,22 @@
 
 For each planner a run of about so many events is recorded, in a folder that is kept, and judged in
 a process of its own. Times are those of the processor, so that others who use the machine do not
-matter, for reading, for each of the slowest rules, and in all.
+matter: for reading, for each of the slowest rules, and in all.
 """
 
 import argparse
-import inspect
 import json
 import resource
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from brrt import McapSink, Run, Scenario, read, verification
+from brrt import McapSink, Run, Scenario, read, verify
+from brrt.verification import verification
+from brrt.verification.rule import Rule
 
 # No goal is ever reached by those that would stop at it.
 NEVER = {"goal_bias": 0.0, "step": 0.02}
@@ -37,7 +37,7 @@ SHOWN = 5
 
 
 def record(planner: str, events: int, folder: Path) -> Path:
-    """Record a run, unless it is there."""
+    """Record a run, unless the file exists."""
     path = folder / f"{planner}-{events}.mcap"
     if not path.exists():
         rate, own = SCENARIOS[planner]
@@ -50,31 +50,21 @@ def record(planner: str, events: int, folder: Path) -> Path:
     return path
 
 
-def timed(rule: Callable[..., Any], spent: Counter[str]) -> Callable[..., Any]:
-    """Measure what a rule takes, window by window if it looks at windows."""
-    name = rule.__name__
+def timed(rule: type[Rule], spent: Counter[str]) -> type[Rule]:
+    """Return a rule that adds up the time that it takes."""
 
-    def whole(case: Any, tally: Any) -> None:
-        began = time.process_time()
-        rule(case, tally)
-        spent[name] += time.process_time() - began  # type: ignore[assignment]
-
-    def windows(case: Any, tally: Any) -> Iterator[None]:
-        looking, window = rule(case, tally), None
-        next(looking)
-        while True:
-            window = yield
+    class Timed(rule):  # type: ignore[valid-type, misc]
+        def window(self, *given: Any) -> None:
             began = time.process_time()
-            try:
-                looking.send(window)
-            except StopIteration:
-                return
-            finally:
-                spent[name] += time.process_time() - began  # type: ignore[assignment]
+            super().window(*given)
+            spent[rule.name] += time.process_time() - began  # type: ignore[assignment]
 
-    wrapped = windows if inspect.isgeneratorfunction(rule) else whole
-    wrapped.__name__, wrapped.__doc__ = name, rule.__doc__
-    return wrapped
+        def finish(self) -> None:
+            began = time.process_time()
+            super().finish()
+            spent[rule.name] += time.process_time() - began  # type: ignore[assignment]
+
+    return Timed
 
 
 def judge(path: Path) -> dict[str, Any]:
@@ -86,14 +76,14 @@ def judge(path: Path) -> dict[str, Any]:
     events = sum(map(len, recording.batches()))
     reading = time.process_time() - began
     began, since = time.process_time(), time.perf_counter()
-    tallies = verification.examine(recording.manifest, recording.world, recording.batches())
+    found = verify(recording)
     return {
         "events": events,
         "reading": reading,
         "took": time.process_time() - began,
         "wall": time.perf_counter() - since,
         "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        "broken": [tally.rule for tally in tallies if tally.broken],
+        "broken": [result.rule for result in found.results if result.broken],
         "slowest": spent.most_common(SHOWN),
     }
 
@@ -122,7 +112,7 @@ def main() -> int:
             f"({found['wall']:.1f} s by the clock)  {found['peak']:5.0f} MB  "
             f"{'BROKEN ' + ', '.join(found['broken']) if found['broken'] else 'holds'}"
         )
-        slowest = ", ".join(f"{name.replace('_', ' ')} {s:.1f}" for name, s in found["slowest"])
+        slowest = ", ".join(f"{name} {s:.1f}" for name, s in found["slowest"])
         print(f"{'':12} of that reading {found['reading']:.1f}, {slowest}", flush=True)
         bad |= bool(found["broken"])
     return int(bad)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from brrt.verification import RULES
+from brrt.verification.rules import RULES
 from brrt.views.viewer import control
 from tests.conftest import Result
 
@@ -67,7 +67,7 @@ def test_promises_page_names_every_rule() -> None:
     page = (ROOT / "docs/promises.md").read_text()
     table = [line.rpartition(" | ")[2] for line in page.splitlines() if line.startswith("| ")]
     named = {name for cell in table for name in re.findall("`([^`]+)`", cell)}
-    assert named == {rule.__name__.replace("_", " ") for rule in RULES}
+    assert named == {rule.name for rule in RULES}
 
 
 def test_events_page_is_up_to_date() -> None:

@@ -1,11 +1,9 @@
-"""Motions of bodies made of convex parts, by numpy and complex numbers: none of the planners' code.
+"""Motions of bodies made of convex parts, in numpy and complex numbers.
 
-A motion is halved again and again (Schwarzer, Saha and Latombe 2005), for each part of the body and
-each thing that it may meet by itself: an obstacle, the bounds, another part. A piece in whose
-middle the two are farther apart than anything can move in half of it is free; one in whose middle
-they meet is blocked. After `HALVINGS` a piece that is neither counts as free where motions are
-said to be free, and as blocked where they are said to be blocked: nobody is blamed for what the
-eye of the checks cannot see, 1024 places to a motion.
+A motion is bisected (Schwarzer, Saha and Latombe 2005), for each part of the body and each thing
+that it may hit: an obstacle, the bounds, another part. A piece in whose middle the two are farther
+apart than any point can move in half of it is free; one in whose middle they touch is blocked. After `HALVINGS` bisections, which is 1024 pieces of a motion, a piece that is neither
+counts as free where a motion is said to be free, and as blocked where it is said to be blocked.
 """
 
 from collections.abc import Iterator
@@ -16,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.collision.obstacles import Obstacles, near
 from brrt.robots import Chain, Polygon
+from brrt.collision.obstacles import Obstacles, near_pairs
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -25,28 +23,28 @@ Ints = NDArray[np.int64]
 
 HALVINGS = 10
 DEPTH = 1e-9
-"""Bodies that overlap by more than this part of the map's longest side are blamed for it."""
+"""Bodies hit if they overlap by more than this part of the map's longest side."""
 
 MARGIN = 2e-6
-"""A motion may be refused that comes closer than this part of the map's longest side."""
+"""A motion may be rejected if it comes closer than this part of the map's longest side."""
 
 _MOTIONS, _PIECES = 4096, 30_000
 
 
 def swept_hits(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Ints:
-    """For each motion what it runs into, an obstacle, the bounds or itself, or -1; shape (n,)."""
+    """Return what each motion hits, an obstacle, the bounds or itself, or -1, shape (n,)."""
     return _sweep(obstacles, robot, a, b, -DEPTH * obstacles.extent, 0.0)[0]
 
 
 def swept_clear(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> NDArray[np.bool_]:
-    """Whether motions are proven to stay farther from everything than `MARGIN`, shape (n,)."""
+    """Return which motions are proved to stay farther from everything than `MARGIN`, shape (n,)."""
     margin = MARGIN * obstacles.extent
     hit, open_ = _sweep(obstacles, robot, a, b, margin, margin)
     return (hit < 0) & ~open_
 
 
 def wrapping_angles(robot: Any, dof: int) -> NDArray[np.bool_]:
-    """Which numbers of a configuration are angles that wrap: a full turn leads back, shape (n,)."""
+    """Return which numbers of a configuration are angles that wrap, shape (dof,)."""
     if not hasattr(robot, "canonical"):
         return np.zeros(dof, bool)
     zero = np.zeros(dof)
@@ -55,19 +53,19 @@ def wrapping_angles(robot: Any, dof: int) -> NDArray[np.bool_]:
 
 
 def towards(robot: Any, a: Floats, b: Floats) -> Floats:
-    """Differences b - a, shape (n, dof), the short way round where an angle wraps."""
+    """Return b - a, the short way round where an angle wraps, shape (n, dof)."""
     step, wraps = b - a, wrapping_angles(robot, a.shape[1])
     step[:, wraps] -= 2 * np.pi * np.round(step[:, wraps] / (2 * np.pi))
     return np.asarray(step)
 
 
-class Shapes(NamedTuple):
-    """Convex shapes, made as long as the longest by repeating their first vertex and axis.
+class ConvexShapes(NamedTuple):
+    """Convex shapes, padded to equal length by repeating their first vertex and axis.
 
     Attributes:
-        vertices: Shape (n, k).
-        axes: Outward normals of the sides; of a line segment its directions too; shape (n, m).
-        radius: What inflates each shape, shape (n,).
+        vertices: Vertices as complex numbers, shape (n, k).
+        axes: Outward normals of the sides, for a line segment also its directions, shape (n, m).
+        radius: By how much each shape is inflated, shape (n,).
     """
 
     vertices: Complex
@@ -75,8 +73,8 @@ class Shapes(NamedTuple):
     radius: Floats
 
 
-def shapes_of(hulls: list[Floats], radius: Floats | None = None) -> Shapes:
-    """Lay out convex polygons, line segments and points, shape (k, 2) each, counter-clockwise."""
+def convex_shapes(hulls: list[Floats], radius: Floats | None = None) -> ConvexShapes:
+    """Convert convex polygons, line segments and points, shape (k, 2) each, counter-clockwise."""
     vertices, axes = [], []
     for hull in hulls:
         z = hull[:, 0] + 1j * hull[:, 1]
@@ -86,7 +84,7 @@ def shapes_of(hulls: list[Floats], radius: Floats | None = None) -> Shapes:
         along = sides if len(sides) == 2 else sides[:0]
         vertices.append(z)
         axes.append(np.concatenate([-1j * sides, along]) if len(sides) else np.ones(1, complex))
-    return Shapes(
+    return ConvexShapes(
         _padded(vertices), _padded(axes), np.zeros(len(hulls)) if radius is None else radius
     )
 
@@ -99,17 +97,17 @@ def _padded(rows: list[Complex]) -> Complex:
 
 
 class Body:
-    """A robot's parts: where they are at configurations, and how far they get on a way.
+    """A robot's parts: their poses, and how far their points move.
 
     Args:
-        robot: A polygon, a chain, or anything with `outline`, `distance` and parts that no motion
-            moves farther than its length in the metric for each number of a configuration.
+        robot: A polygon, a chain, or an object with `outline`, `distance`, and parts whose points
+            move at most `dof` times the motion's length in the metric.
         dof: Numbers in a configuration.
     """
 
     def __init__(self, robot: Any, dof: int) -> None:
         self.robot, self.dof, self.hulls = robot, dof, _hulls(robot, dof)
-        self.shapes = shapes_of(self.hulls)
+        self.shapes = convex_shapes(self.hulls)
         self.pairs = np.empty((0, 2), np.int64)
         if isinstance(robot, Chain) and robot.self_collision:
             n = len(self.hulls)
@@ -117,7 +115,7 @@ class Body:
             self.pairs = np.array(pairs, np.int64).reshape(-1, 2)
 
     def frames(self, Q: Floats) -> tuple[Complex, Complex]:
-        """Where each part's origin is and how it is turned, shapes (n, parts)."""
+        """Return the origin and the rotation of each part, shapes (n, parts)."""
         if isinstance(self.robot, Chain):
             robot = self.robot
             assert robot.base_x is not None and robot.base_y is not None  # noqa: S101, PT018 - settled
@@ -131,10 +129,10 @@ class Body:
         return at, np.broadcast_to(np.exp(1j * Q[:, 2])[:, None], shape)
 
     def placed(self, Q: Floats, part: Ints) -> tuple[Complex, Complex]:
-        """Vertices and axes of one part at each configuration, shapes (n, k) and (n, m)."""
+        """Return vertices and axes of one part at each configuration, shapes (n, k) and (n, m)."""
         if not isinstance(self.robot, Chain | Polygon):
             hulls = [self.robot.outline(q)[p] for q, p in zip(Q, part, strict=True)]
-            shapes = shapes_of([np.asarray(hull, np.float64) for hull in hulls])
+            shapes = convex_shapes([np.asarray(hull, np.float64) for hull in hulls])
             return shapes.vertices, shapes.axes
         at, turn = self.frames(Q)
         rows = np.arange(len(Q))
@@ -143,7 +141,7 @@ class Body:
 
     @cached_property
     def _reach(self) -> Floats:
-        """How far any point of part j gets from joint i, shape (joints, parts)."""
+        """The greatest distance of a point of part j from joint i, shape (joints, parts)."""
         far = np.array([np.hypot(*hull.T).max() for hull in self.hulls])
         if isinstance(self.robot, Polygon):
             return far[None]
@@ -155,7 +153,7 @@ class Body:
         return reach
 
     def moves(self, a: Floats, b: Floats, step: Floats) -> Floats:
-        """How far any point of each part moves on the whole way at most, shape (n, parts)."""
+        """Return an upper bound of how far any point of each part moves, shape (n, parts)."""
         turns = np.abs(step)
         if isinstance(self.robot, Chain):
             return np.asarray(turns @ self._reach) * (1 + 1e-9)
@@ -167,7 +165,7 @@ class Body:
 
 
 def _hulls(robot: Any, dof: int) -> list[Floats]:
-    """The parts in their own frames; of a robot of another kind as they are at the origin."""
+    """Return the parts in their own frames, for robots of other kinds those at the origin."""
     if isinstance(robot, Polygon):
         return [np.asarray(part) for part in robot.parts]
     if isinstance(robot, Chain):
@@ -177,15 +175,15 @@ def _hulls(robot: Any, dof: int) -> list[Floats]:
 
 @dataclass(slots=True)
 class _Pieces:
-    """Pieces of motions, each with a part of the body and what that may meet; shapes (n,).
+    """Pieces of motions, each with a part of the body and what that may hit; shapes (n,).
 
     Attributes:
         motion: Number of the motion.
-        middle: Middle of the piece, as a part of the motion.
+        middle: Middle of the piece, from 0 to 1 along the motion.
         part: Part of the body.
-        other: Obstacle; from `Obstacles.bounds` on the bounds, then the body itself.
-        mate: The other part, where it is the body itself.
-        move: How far the two may come closer on the whole motion.
+        other: An obstacle, `Obstacles.bounds`, or `Obstacles.itself`.
+        mate: The other part, if it is the body itself.
+        move: By how much the two may approach each other in the whole motion.
     """
 
     motion: Ints
@@ -205,26 +203,26 @@ class _Pieces:
 def _sweep(
     obstacles: Obstacles, robot: Any, a: Floats, b: Floats, touch: float, clear: float
 ) -> tuple[Ints, NDArray[np.bool_]]:
-    """Find for each motion what it meets, or -1, and whether something was left undecided.
+    """Return for each motion what it hits, or -1, and whether a piece was left undecided.
 
     Args:
-        obstacles: What is in the way.
-        robot: What moves.
+        obstacles: The obstacles.
+        robot: The robot.
         a: Where the motions begin, shape (n, dof).
         b: Where they end.
-        touch: Closer than this is a hit.
-        clear: A piece is free that stays farther than this.
+        touch: Distances below this are hits.
+        clear: Distances above this are free.
     """
     hit, undecided = np.full(len(a), -1), np.zeros(len(a), bool)
-    body, scenery = Body(robot, a.shape[1]), obstacles.shapes
+    body = Body(robot, a.shape[1])
     step = towards(robot, a, b)
-    # What is no number is the bounds' rule to find; what is far off would halve for ever.
+    # The rule on bounds finds what is not a number, or so far away that bisection has no end.
     sane = np.isfinite(step).all(axis=1) & np.isfinite(a).all(axis=1)
     sane &= (np.abs(a) < 1e6 * (1 + obstacles.extent)).all(axis=1)
     rows = np.flatnonzero(sane)
     for first in range(0, len(rows), _MOTIONS):
         some = rows[first : first + _MOTIONS]
-        pieces = _begun(obstacles, body, a[some], b[some], step[some], clear)
+        pieces = _whole_motions(obstacles, body, a[some], b[some], step[some], clear)
         pieces.motion = some[pieces.motion]
         stack = [(0, pieces[i : i + _PIECES]) for i in range(0, len(pieces), _PIECES)]
         while stack:
@@ -233,7 +231,7 @@ def _sweep(
             if not len(pieces):
                 continue
             Q = a[pieces.motion] + pieces.middle[:, None] * step[pieces.motion]
-            apart = _apart(obstacles, scenery, body, Q, pieces)
+            apart = _apart(obstacles, body, Q, pieces)
             met = apart < touch
             hit[pieces.motion[met]] = pieces.other[met]
             half = 0.5 ** (level + 1)
@@ -255,10 +253,10 @@ def _halves(level: int, *pieces: _Pieces) -> Iterator[tuple[int, _Pieces]]:
             yield level, some[i : i + _PIECES]
 
 
-def _begun(
+def _whole_motions(
     obstacles: Obstacles, body: Body, a: Floats, b: Floats, step: Floats, clear: float
 ) -> _Pieces:
-    """Whole motions, each with every part and all that the part may meet."""
+    """Return whole motions, each with every part and all that the part may hit."""
     n, parts = len(a), len(body.hulls)
     moves = body.moves(a, b, step)
     motion, part = (x.reshape(-1) for x in np.mgrid[:n, :parts])
@@ -266,7 +264,7 @@ def _begun(
     room = (moves.reshape(-1) / 2 + clear)[:, None]
     low = np.stack([vertices.real.min(axis=1), vertices.imag.min(axis=1)], axis=1) - room
     high = np.stack([vertices.real.max(axis=1), vertices.imag.max(axis=1)], axis=1) + room
-    found = list(near(low, high, obstacles)) if len(obstacles) else []
+    found = list(near_pairs(low, high, obstacles)) if len(obstacles) else []
     wall = np.flatnonzero(
         (low < obstacles.walls[0]).any(axis=1) | (high > obstacles.walls[1]).any(axis=1)
     )
@@ -285,9 +283,9 @@ def _begun(
     )
 
 
-def _apart(obstacles: Obstacles, scenery: Shapes, body: Body, Q: Floats, pieces: _Pieces) -> Floats:
-    """Lower bounds of how far each piece's two are apart, below 0 in overlap, shape (n,)."""
-    apart = np.empty(len(pieces))
+def _apart(obstacles: Obstacles, body: Body, Q: Floats, pieces: _Pieces) -> Floats:
+    """Return lower bounds of the distances, below 0 for overlap, shape (n,)."""
+    apart, shapes = np.empty(len(pieces)), obstacles.shapes
     vertices, axes = body.placed(Q, pieces.part)
     walls = pieces.other == obstacles.bounds
     if walls.any():
@@ -305,17 +303,17 @@ def _apart(obstacles: Obstacles, scenery: Shapes, body: Body, Q: Floats, pieces:
     if len(flat):
         other = pieces.other[flat]
         apart[flat] = _separation(
-            vertices[flat], axes[flat], scenery.vertices[other], scenery.axes[other]
+            vertices[flat], axes[flat], shapes.vertices[other], shapes.axes[other]
         )
     if len(balls):
         other = pieces.other[balls]
-        gaps = _from_point(vertices[balls], axes[balls], scenery.vertices[other, 0])
-        apart[balls] = gaps - scenery.radius[other]
+        gaps = _from_point(vertices[balls], axes[balls], shapes.vertices[other, 0])
+        apart[balls] = gaps - shapes.radius[other]
     return apart
 
 
 def _along(axes: Complex, vertices: Complex) -> Floats:
-    """How far each vertex lies along each axis, shape (n, axes, vertices)."""
+    """Return the projection of each vertex on each axis, shape (n, axes, vertices)."""
     return np.asarray(
         axes.real[:, :, None] * vertices.real[:, None]
         + axes.imag[:, :, None] * vertices.imag[:, None]
@@ -323,8 +321,8 @@ def _along(axes: Complex, vertices: Complex) -> Floats:
 
 
 def _separation(one: Complex, normals: Complex, other: Complex, others: Complex) -> Floats:
-    """Greatest separation along a normal of either: above 0 exactly where the two are apart."""
-    # From a vertex of one of them, so that what is far from the origin is rounded no more.
+    """Return the greatest separation along a normal of either, above 0 if they are disjoint."""
+    # Relative to a vertex, so that shapes far from the origin are not rounded more.
     origin = one[:, :1]
     one, other = one - origin, other - origin
     ours = _along(normals, other).min(axis=2) - _along(normals, one).max(axis=2)
@@ -333,7 +331,7 @@ def _separation(one: Complex, normals: Complex, other: Complex, others: Complex)
 
 
 def _from_point(shape: Complex, normals: Complex, point: Complex) -> Floats:
-    """Distances of points from shapes, below 0 inside, shape (n,)."""
+    """Return distances of points from shapes, below 0 inside, shape (n,)."""
     offset, sides = point[:, None] - shape, np.roll(shape, -1, axis=1) - shape
     square = np.abs(sides) ** 2
     part = (offset * sides.conj()).real / np.where(square > 0, square, 1.0)

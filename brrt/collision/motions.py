@@ -1,8 +1,7 @@
-"""Whether motions are free, by numpy and formulas of its own: none of the planners' code.
+"""Whether motions are free: numpy geometry that shares no code with the planners.
 
-A motion counts as blocked where it enters an obstacle by more than `DEPTH` of the lengths at
-hand. So rounding never blames a planner, and whatever really goes through something is found.
-Bodies are looked at in `brrt.collision.bodies`.
+A motion of a point is blocked if it enters an obstacle by more than `DEPTH` of the lengths
+involved, which is above all rounding. For bodies, see `brrt.collision.bodies`.
 """
 
 from collections.abc import Iterator
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.collision.bodies import swept_clear, swept_hits, towards
-from brrt.collision.obstacles import Obstacles, near
+from brrt.collision.obstacles import Obstacles, near_pairs
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -22,11 +21,11 @@ DEPTH = 1e-9
 
 
 def first_hits(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Ints:
-    """For each motion the number of something that it runs into, or -1; shape (n,).
+    """Return for each motion the number of something that it hits, or -1, shape (n,).
 
     Args:
-        obstacles: What is in the way.
-        robot: What moves: a body with an outline in the plane, or a point, which has none.
+        obstacles: The obstacles.
+        robot: The robot: a body with an outline in the plane, or a point, which has none.
         a: Where the motions begin, shape (n, dof).
         b: Where they end, shape (n, dof).
     """
@@ -41,9 +40,9 @@ def first_hits(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Ints:
 
 
 def all_clear(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Flags:
-    """Whether motions keep clear of everything, by more than a planner may refuse; shape (n,).
+    """Return which motions have more clearance than a planner may reject, shape (n,).
 
-    For a point that is `DEPTH` of the lengths at hand, for a body `bodies.MARGIN` of the map.
+    For a point that is `DEPTH` of the lengths involved, for a body `bodies.MARGIN` of the map.
     """
     if not len(a):
         return np.empty(0, bool)
@@ -56,19 +55,19 @@ def all_clear(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Flags:
 
 
 def has_parts(robot: Any, dof: int) -> bool:
-    """Whether a robot is a body; else it is a point."""
+    """Return whether a robot is a body; otherwise it is a point."""
     return hasattr(robot, "outline") and bool(len(robot.outline(np.zeros(dof))))
 
 
 def _straight(
     obstacles: Obstacles, a: Floats, b: Floats, depth: float
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Yield motions of a point and what they enter by `depth`, or pass at -`depth`."""
+    """Yield motions of a point and what they enter by `depth`, or pass within -`depth`."""
     if not len(obstacles):
         return
     wider = max(0.0, -2 * depth * obstacles.extent)
     low, high = np.minimum(a, b) - wider, np.maximum(a, b) + wider
-    for i, j in near(low, high, obstacles):
+    for i, j in near_pairs(low, high, obstacles):
         for kind, m, k in obstacles.parts(i, j):
             if kind == 0:
                 hit = _enters_box(a[m], b[m], obstacles.boxes[k], depth)
@@ -77,20 +76,20 @@ def _straight(
             else:
                 ends = np.stack([a[m], b[m]], axis=1)
                 hit = _by_polygon(obstacles, k, ends, depth)
-            yield m[hit], obstacles.total(kind, k[hit])
+            yield m[hit], obstacles.number(kind, k[hit])
 
 
 def _enters_box(a: Floats, b: Floats, boxes: Floats, depth: float) -> Flags:
-    """Clip each segment to the slabs of its box, less `depth`; shapes (n, d), (n, 2 d)."""
+    """Clip each segment to the slabs of its box, shrunk by `depth`; shapes (n, d), (n, 2 d)."""
     d = a.shape[1]
     corners = boxes[:, :d], boxes[:, d:]
     size = _size(a, b, *corners)[:, None]
-    # A box may be thinner than that; through its middle is through it all the same.
+    # A box may be thinner than that; then its middle is what counts.
     inset = np.minimum(depth * size, (corners[1] - corners[0]) / 2)
     low, high = corners[0] + inset, corners[1] - inset
     step = b - a
     still, inside = step == 0, (low <= a) & (a <= high)
-    with np.errstate(divide="ignore", invalid="ignore"):  # where it stands still
+    with np.errstate(divide="ignore", invalid="ignore"):  # along axes without motion
         one, two = (low - a) / step, (high - a) / step
     enter = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(one, two)).max(axis=1)
     leave = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(one, two)).min(axis=1)
@@ -98,7 +97,7 @@ def _enters_box(a: Floats, b: Floats, boxes: Floats, depth: float) -> Flags:
 
 
 def _enters_ball(a: Floats, b: Floats, balls: Floats, depth: float) -> Flags:
-    """Compare each segment's closest point with the radius less `depth`."""
+    """Compare the distance of each segment with the radius, shrunk by `depth`."""
     d = a.shape[1]
     centre, radius = balls[:, :d], balls[:, d]
     size = _size(a, b, centre - radius[:, None], centre + radius[:, None])
@@ -110,7 +109,7 @@ def _enters_ball(a: Floats, b: Floats, balls: Floats, depth: float) -> Flags:
 
 
 def _size(*corners: Floats) -> Floats:
-    """Longest side of the box around points, shape (n,)."""
+    """Return the longest side of the box around points, shape (n,)."""
     low, high = corners[0], corners[0]
     for corner in corners[1:]:
         low, high = np.minimum(low, corner), np.maximum(high, corner)
@@ -118,7 +117,7 @@ def _size(*corners: Floats) -> Floats:
 
 
 def _by_polygon(obstacles: Obstacles, which: Ints, shapes: Floats, depth: float) -> Flags:
-    """Whether convex shapes, (n, k, 2), go into the polygons of these numbers, shape (n,)."""
+    """Return which convex shapes, (n, k, 2), enter the polygons of these numbers, shape (n,)."""
     hit = np.zeros(len(which), bool)
     for j in np.unique(which).tolist():
         rows = np.flatnonzero(which == j)
@@ -127,9 +126,9 @@ def _by_polygon(obstacles: Obstacles, which: Ints, shapes: Floats, depth: float)
 
 
 def _overlap(shapes: Floats, polygon: Floats, least: float) -> Flags:
-    """Whether convex shapes, (n, k, 2), overlap a convex polygon, (m, 2), by more than `least`.
+    """Return which convex shapes, (n, k, 2), overlap a polygon, (m, 2), by more than `least`.
 
-    Two convex shapes are apart exactly where the normal of an edge of one of them parts them.
+    Two convex shapes are disjoint exactly if the normal of an edge of one of them separates them.
     """
     corners = np.broadcast_to(polygon, (len(shapes), *polygon.shape))
     size = np.maximum(shapes.max(axis=1), polygon.max(axis=0)) - np.minimum(
@@ -138,16 +137,16 @@ def _overlap(shapes: Floats, polygon: Floats, least: float) -> Flags:
     axes = np.concatenate([_normals(corners), _normals(shapes)], axis=1)
     ours, theirs = shapes @ axes.swapaxes(1, 2), corners @ axes.swapaxes(1, 2)
     depth = np.minimum(ours.max(axis=1) - theirs.min(axis=1), theirs.max(axis=1) - ours.min(axis=1))
-    none = ~axes.any(axis=2)  # a side without a length has no normal
+    none = ~axes.any(axis=2)  # a side of length 0 has no normal
     return np.asarray(((depth > least * size.max(axis=1)[:, None]) | none).all(axis=1))
 
 
 def _normals(shapes: Floats) -> Floats:
-    """Unit normals of the sides, zero for sides without a length, shape (n, k, 2)."""
+    """Return the unit normals of the sides, zero for sides of length 0, shape (n, k, 2)."""
     sides = np.roll(shapes, -1, axis=1) - shapes
     normals = np.stack([sides[..., 1], -sides[..., 0]], axis=2)
     length = np.sqrt((normals * normals).sum(axis=2, keepdims=True))
     return np.asarray(normals / np.where(length > 0, length, 1))
 
 
-__all__ = ["DEPTH", "Obstacles", "all_clear", "first_hits", "has_parts", "near", "towards"]
+__all__ = ["DEPTH", "Obstacles", "all_clear", "first_hits", "has_parts", "near_pairs", "towards"]

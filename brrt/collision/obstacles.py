@@ -1,4 +1,4 @@
-"""What is in the way, as the checks see it, and which motions come near it."""
+"""The obstacles of a world under one numbering, and which boxes are near them."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brrt.worlds.world import World
 
 if TYPE_CHECKING:
-    from brrt.collision.bodies import Shapes
+    from brrt.collision.bodies import ConvexShapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,13 +18,16 @@ Flags = NDArray[np.bool_]
 
 _GROUP, _CANDIDATES, _PAIRS, _CELLS = 64, 1 << 16, 8192, 64
 _WIDTHS = 12
-"""Obstacles are told apart by width down to this many halvings of the map's."""
+"""Obstacles are grouped by width, down to this many halvings of that of the map."""
 
 
 class Obstacles:
-    """Boxes, balls and convex polygons under one numbering, with the boxes around them.
+    """Boxes, balls and convex polygons under one numbering, with their bounding boxes.
 
-    The blocked cells of an occupancy grid are among the boxes, or the polygons if it is turned.
+    The blocked cells of an occupancy grid are among the boxes, or the polygons if it is rotated.
+
+    Args:
+        world: The world.
     """
 
     def __init__(self, world: World) -> None:
@@ -44,23 +47,23 @@ class Obstacles:
 
     @property
     def bounds(self) -> int:
-        """The number of the bounds, which are solid for bodies."""
+        """The number of the bounds, which bodies must not cross."""
         return len(self)
 
     @property
     def itself(self) -> int:
-        """The number of the body itself, whose parts may have to keep apart."""
+        """The number of the body itself, whose parts must not touch if the robot says so."""
         return len(self) + 1
 
     @cached_property
-    def shapes(self) -> "Shapes":
+    def shapes(self) -> "ConvexShapes":
         """All obstacles in the plane as convex shapes; balls are points with a radius."""
-        from brrt.collision.bodies import shapes_of  # noqa: PLC0415 - stands above this file
+        from brrt.collision.bodies import convex_shapes  # noqa: PLC0415 - a cycle
 
         hulls = [_corners(box) for box in self.boxes] + list(self.balls[:, None, :2])
         radius = np.zeros(len(self))
         radius[len(self.boxes) : self.ends[1]] = self.balls[:, 2]
-        return shapes_of([*hulls, *self.polygons], radius)
+        return convex_shapes([*hulls, *self.polygons], radius)
 
     @cached_property
     def round(self) -> Flags:
@@ -70,11 +73,11 @@ class Obstacles:
 
     @cached_property
     def strips(self) -> tuple[int, list[tuple[Ints, Floats, Floats]]]:
-        """Obstacles of about one width, sorted along the map's longest axis.
+        """Obstacles grouped by width and sorted along the map's longest axis.
 
         Returns:
-            The axis, and for each width: the obstacles' numbers, where each begins, and how far
-            it and those before it reach at most.
+            The axis, and for each width: the numbers of the obstacles, where each begins, and the
+            farthest end of it and those before it.
         """
         axis = int((self.walls[1] - self.walls[0]).argmax())
         lower, upper = self.lower[:, axis], self.upper[:, axis]
@@ -87,7 +90,7 @@ class Obstacles:
         return axis, strips
 
     def name(self, j: int) -> str:
-        """Name an obstacle as the world numbers it."""
+        """Return the name of an obstacle, by its number in the world."""
         if j >= len(self):
             return "the bounds" if j == self.bounds else "the robot itself"
         kind = int(np.searchsorted(self.ends, j, side="right"))
@@ -97,30 +100,32 @@ class Obstacles:
         return f"{('box', 'ball', 'polygon')[kind]} {number}"
 
     def parts(self, i: Ints, j: Ints) -> Iterator[tuple[int, Ints, Ints]]:
-        """Part pairs by the kind of their obstacle: 0 boxes, 1 balls, 2 polygons."""
+        """Split pairs by the kind of their obstacle: 0 boxes, 1 balls, 2 polygons."""
         kinds = np.searchsorted(self.ends, j, side="right")
         for kind in np.unique(kinds).tolist():
             first = 0 if kind == 0 else self.ends[kind - 1]
             yield kind, i[kinds == kind], j[kinds == kind] - first
 
-    def total(self, kind: int, j: Ints) -> Ints:
-        """Return the common number of obstacles that are numbered within their kind."""
+    def number(self, kind: int, j: Ints) -> Ints:
+        """Return the numbers of obstacles that are numbered within their kind."""
         return j + (0 if kind == 0 else self.ends[kind - 1])
 
 
-def near(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints, Ints]]:
-    """Yield pairs of a box and an obstacle that may meet; boxes that lie together go together.
+def near_pairs(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints, Ints]]:
+    """Yield pairs of a box and an obstacle whose bounding boxes meet.
+
+    Boxes that are close together are compared as a group first.
 
     Args:
         low: Least corners, shape (n, d).
         high: Greatest corners, shape (n, d).
-        obstacles: What is in the way; what is far from a group along an axis costs nothing.
+        obstacles: The obstacles; those far from a group along an axis cost nothing.
     """
     order = np.argsort(_keys((low + high) / 2), kind="stable")
     starts = np.arange(0, len(order), _GROUP)
     ends = np.stack([low[order], high[order]])
     groups = np.minimum.reduceat(ends[0], starts), np.maximum.reduceat(ends[1], starts)
-    # Places left in the last group meet nothing: no comparison with them is true.
+    # Comparisons with nan are false, so unused places of the last group meet nothing.
     places = np.full((low.shape[1], 2, len(starts) * _GROUP), np.nan)
     places[:, :, : len(order)] = ends.transpose(2, 0, 1)
     members = places.reshape(low.shape[1], 2, len(starts), _GROUP)
@@ -136,7 +141,7 @@ def near(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints
 
 
 def _near_groups(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tuple[Ints, Ints]]:
-    """Yield pairs of a box and an obstacle that meet, sorted by box, then obstacle."""
+    """Yield pairs of a box and an obstacle that meet, by box, then obstacle."""
     axis, strips = obstacles.strips
     firsts = [np.searchsorted(reach, low[:, axis], side="left") for _, _, reach in strips]
     lasts = [np.searchsorted(begin, high[:, axis], side="right") for _, begin, _ in strips]
@@ -156,15 +161,15 @@ def _near_groups(low: Floats, high: Floats, obstacles: Obstacles) -> Iterator[tu
 
 
 def _meet(low: Floats, high: Floats, other_low: Floats, other_high: Floats) -> Flags:
-    """Whether boxes overlap or touch, shapes (..., d)."""
+    """Return which boxes overlap or touch, shapes (..., d)."""
     meets = np.asarray(True)
-    for k in range(low.shape[-1]):  # an axis at a time: numpy is slow along a short last one
+    for k in range(low.shape[-1]):  # axis by axis: numpy is slow along a short last axis
         meets = meets & (low[..., k] <= other_high[..., k]) & (other_low[..., k] <= high[..., k])
     return meets
 
 
 def _keys(places: Floats) -> Ints:
-    """Number cells of a grid, so that places in one cell have one key, shape (n,)."""
+    """Return the numbers of the cells of a grid that places are in, shape (n,)."""
     low, high = places.min(axis=0), places.max(axis=0)
     cells = ((places - low) / np.where(high > low, high - low, 1) * (_CELLS - 1)).astype(np.int64)
     keys = np.zeros(len(places), np.int64)
@@ -174,6 +179,6 @@ def _keys(places: Floats) -> Ints:
 
 
 def _corners(box: Floats) -> Floats:
-    """A box in the plane as a polygon; a flat one as a line segment or a point."""
+    """Return a box in the plane as a polygon, a flat one as a line segment or a point."""
     corners = box[[[0, 1], [2, 1], [2, 3], [0, 3]]]
     return corners if (box[:2] < box[2:]).all() else np.unique(corners, axis=0)

@@ -82,13 +82,14 @@ class KeptEvents:
 
     Attributes:
         last_iteration: The greatest iteration so far.
+        count: Events so far, kept or not.
         kinds: The kinds that have occurred, kept or not.
     """
 
     def __init__(self, dof: int, contract: Contract) -> None:
         self._dof, self._contract = dof, contract
         self._tables: dict[Kind, _GrowingTable] = {kind: _GrowingTable() for kind in Kind}
-        self.last_iteration = 0
+        self.last_iteration = self.count = 0
         self.kinds: set[Kind] = set()
 
     def add(self, window: Events) -> None:
@@ -97,6 +98,7 @@ class KeptEvents:
             if not len(table):
                 continue
             self.kinds.add(kind)
+            self.count += len(table)
             self.last_iteration = max(self.last_iteration, int(table["iteration"].max()))
             rows = self._needed(kind, table)
             if rows is not None:

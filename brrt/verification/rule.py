@@ -102,7 +102,7 @@ class IterationRule(Rule):
     needs = "growth"
     kind: ClassVar[Kind | None] = Kind.SAMPLE
 
-    def window(self, events: Events, contract: Contract) -> None:  # noqa: ARG002 - a rule's signature
+    def window(self, events: Events, contract: Contract) -> None:  # noqa: ARG002
         """Judge the iterations that end in a window."""
         self._judge(contract, last=False)
 

@@ -27,7 +27,8 @@ class Verification:
 
     Attributes:
         results: What each rule found; one without anything to judge has examined nothing.
-        not_judged: Names of rules that the recording gives nothing to judge by, for each reason.
+        not_judged: Names of rules that could not judge, for each reason.
+        events: How many events were judged.
         has_contract: Whether there is a contract; without one only what all planners promise is
             judged.
         is_cut: Whether the run's end is missing; then no rule judges it.
@@ -35,6 +36,7 @@ class Verification:
 
     results: list[RuleResult]
     not_judged: Mapping[str, list[str]]
+    events: int
     has_contract: bool
     is_cut: bool
 
@@ -74,7 +76,8 @@ def verify(recording: Recording, *, contract: Contract | None = None) -> Verific
         for rule in active:
             rule.finish()
     results = [rule.result for rule in rules]
-    return Verification(results, _not_judged(rules), context.has_contract, context.is_cut)
+    missing, count = _not_judged(rules), context.kept.count
+    return Verification(results, missing, count, context.has_contract, context.is_cut)
 
 
 def _windows(batches: Iterable[Events], firsts: list[int]) -> Iterator[Events]:

@@ -196,11 +196,11 @@ class Babble:
 @pytest.mark.parametrize(
     ("planner", "message"),
     [
-        (Babble(Kind.PHASE, name=7, status=0), "phase has name = 7; there is 0 (plan), 1 (smooth)"),
-        (Babble(Kind.PHASE, name=0, status=99), "phase has status = 99; there is 0 (begin)"),
-        (Babble(Kind.SAMPLE, tree=0, source=9, q=[1, 1]), "sample has source = 9; there is 0 (uni"),
+        (Babble(Kind.PHASE, name=7, status=0), "phase has name = 7; possible are 0 (plan), 1 (s"),
+        (Babble(Kind.PHASE, name=0, status=99), "phase has status = 99; possible are 0 (begin)"),
+        (Babble(Kind.SAMPLE, tree=0, source=9, q=[1, 1]), "sample has source = 9; possible are"),
         (Babble(Kind.SAMPLE, tree=0, source=0, q=[1, np.nan]), "sample has q = [ 1. nan]"),
-        (Babble(Kind.PATH, stage=5, cost=1.0, waypoints=[[1, 1]]), "path has stage = 5; there is"),
+        (Babble(Kind.PATH, stage=5, cost=1.0, waypoints=[[1, 1]]), "path has stage = 5; possi"),
     ],
     ids=["phase", "status", "source", "not a number", "stage"],
 )

@@ -20,8 +20,8 @@ from brrt import (
     Run,
     Scenario,
     World,
-    check,
     read,
+    verify,
 )
 from brrt.comparison.settings import settings_of
 from brrt.events import Events
@@ -29,7 +29,8 @@ from brrt.planners import PLANNERS, make_planner, state_contract
 from brrt.scenario import contracts
 from brrt.scenario.contract import Contract, Draws, Growth, Lattice, Near, PlannerInfo
 from brrt.scenario.contracts import changes_of, contract_of, contracts_of, planner_settings
-from brrt.verification import RULES, RuleResult, examine
+from brrt.verification.result import RuleResult
+from brrt.verification.rules import RULES
 from tests.conftest import Result, recorded, result_of
 from tests.support import toys
 
@@ -212,15 +213,14 @@ BLOCKED = """
 import json, sys
 for name in ("numba", "llvmlite", "brrt.kernels", "brrt.planners", "brrt.runs"):
     sys.modules[name] = None  # an import of it fails
-from brrt import read
+from brrt import read, verify
 from brrt.scenario.contracts import contract_of, planner_settings
-from brrt.verification import examine
 all_found = []
 for path in sys.argv[1:]:
     run = read(path)
     rules = [
         (each.rule, each.examined, each.broken, [found.message for found in each.findings])
-        for each in examine(run.manifest, run.world, run.events(), figures=run.result)
+        for each in verify(run).results
         if each.rule != "contract"
     ]
     contract = contract_of(run.manifest, run.world).as_dict()
@@ -244,7 +244,7 @@ def test_verify_needs_no_planner(tmp_path: Path) -> None:
     *found, golden = json.loads(done.stdout)
     for path, (rules, contract, known) in zip(paths, found, strict=True):
         kept = read(path)
-        here = examine(kept.manifest, kept.world, kept.events(), figures=kept.result)
+        here = verify(kept).results
         assert rules == json.loads(json.dumps(findings(here)))
         assert Contract.from_dict(contract) == contract_of(kept.manifest, kept.world)
         assert known == list(planner_settings(kept.manifest))
@@ -263,7 +263,7 @@ def test_a_forged_contract_is_found(
     forged = replace(run.manifest.contract or Contract(), **changed)
     (name,) = changed
     path = saved(run, log, tmp_path / "forged.mcap", contract=forged)
-    found = check(read(path).manifest, run.problem.world, log)
+    found = verify(read(path)).findings
     assert {each.rule for each in found} == {"contract"}
     assert found[0].message.startswith(name)
     done = brrt("verify", path)
@@ -271,7 +271,7 @@ def test_a_forged_contract_is_found(
     assert "BROKEN" in done.out
     older = {**run.manifest.made_by, "brrt": "0.0.1"}
     saved(run, log, path, contract=forged, made_by=older)
-    assert check(read(path).manifest, run.problem.world, log) == []
+    assert verify(read(path)).holds
     done = brrt("verify", path)
     assert done.code == 0
     assert f"the contract is that of brrt 0.0.1: {name}" in done.err
@@ -323,7 +323,7 @@ def test_a_rule_reads_the_stretch_that_it_judges() -> None:
         Recording(parent.manifest, parent.problem.world, lambda: [log]), iteration=2, seed=4
     )
     assert len(contracts_of(run.manifest, run.problem.world)) == 2
-    assert any(rule.__name__ == "contract" for rule in RULES)
+    assert any(rule.name == "contract" for rule in RULES)
 
 
 def test_parameters_are_checked_by_the_planning_wing(

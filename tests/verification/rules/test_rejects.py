@@ -8,7 +8,7 @@ import pytest
 
 from brrt import Kind
 from brrt.events import Reason
-from brrt.verification.collision.motions import Obstacles, all_clear, first_hits
+from brrt.collision.motions import Obstacles, all_clear, first_hits
 from tests.support.cases import (
     GROWTH,
     Case,

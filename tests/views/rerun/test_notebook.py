@@ -41,7 +41,7 @@ def test_example_notebook(
     assert "first path: cost" in out
     assert f"{len(names['rejected'])} rejections" in out
     recording = names["recording"]
-    assert brrt.check(recording.manifest, recording.world, recording.events()) == []
+    assert brrt.verify(recording).findings == []
     assert len(plt.get_fignums()) == 4
 
 
