@@ -1,4 +1,4 @@
-"""The checks' own geometry, against exact fractions and against points along the way."""
+"""Collision geometry, against exact fractions and against points along the motion."""
 
 import numpy as np
 import pytest

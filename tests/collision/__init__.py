@@ -1,0 +1,1 @@
+"""Tests of the collision geometry of the reading wing."""
