@@ -10,8 +10,9 @@ from brrt.robots import Point
 from brrt.collision import obstacles as obstacles_module
 from brrt.collision.motions import Obstacles, all_clear, first_hits, near_pairs
 from brrt.worlds import World
-from tests.robots.test_robots import BODIES, MAKERS, free, random_edges, random_world
+from tests.kernels.test_spaces import free
 from tests.support import naive
+from tests.support.bodies import BODIES, MAKERS, random_edges, random_world
 
 Floats = NDArray[np.float64]
 
