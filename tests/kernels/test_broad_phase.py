@@ -1,6 +1,6 @@
 """The compiled collision test against exact arithmetic.
 
-It may never call free what touches, and may call a hit only what nearly touches.
+A segment that touches is never free, and a hit at least nearly touches.
 """
 
 from collections.abc import Iterator
@@ -39,28 +39,28 @@ def first_to_second(obstacles: ObstacleGrid, ends: Floats) -> bool:
 
 
 def compiled_hits(obstacles: ObstacleGrid, a: Floats, b: Floats) -> bool:
-    """Ask the kernel about one segment."""
+    """Result of the kernel for one segment."""
     return bool(first_to_second(obstacles, np.array([a, b])))
 
 
 def check(world: World, segments: Iterator[Segment] | list[Segment]) -> None:
-    """Hold the kernel to the exact test, for each segment both ways round."""
+    """Compare the kernel with the exact test, for each segment in both directions."""
     obstacles = build_obstacle_grid(world)
     for a, b in segments:
-        truth = naive.hits(world, a, b)
+        touches = naive.hits(world, a, b)
         for p, q in ((a, b), (b, a)):
-            said = compiled_hits(obstacles, p, q)
+            hit = compiled_hits(obstacles, p, q)
             where = f"from {p.tolist()} to {q.tolist()} in {world.to_json()}"
-            assert said or not truth, f"called free, but touches: {where}"
-            assert truth or not said or naive.nearly_hits(world, p, q), f"no hit: {where}"
+            assert hit or not touches, f"free, but touches: {where}"
+            assert touches or not hit or naive.nearly_hits(world, p, q), f"no hit: {where}"
 
 
 def check_exactly(world: World, segments: Iterator[Segment] | list[Segment]) -> None:
-    """Hold the kernel to the exact test where nothing rounds enough to matter."""
+    """Compare the kernel with the exact test where rounding does not matter."""
     obstacles = build_obstacle_grid(world)
     for a, b in segments:
-        said, truth = compiled_hits(obstacles, a, b), naive.hits(world, a, b)
-        assert said == truth, f"from {a.tolist()} to {b.tolist()} in {world.to_json()}"
+        hit, touches = compiled_hits(obstacles, a, b), naive.hits(world, a, b)
+        assert hit == touches, f"from {a.tolist()} to {b.tolist()} in {world.to_json()}"
 
 
 def random_world(rng: np.random.Generator, dim: int, n: int, largest: float = 3.0) -> World:
@@ -243,7 +243,7 @@ def test_every_segment_of_a_small_lattice(dim: int) -> None:
 
 @st.composite
 def border_cases(draw: st.DrawFn) -> tuple[World, list[Segment]]:
-    """ObstacleGrid and segments whose coordinates lie on the borders of the grid's cells."""
+    """Obstacles and segments whose coordinates lie on the borders of the grid's cells."""
     dim = draw(st.sampled_from([2, 3]))
     n = draw(st.integers(1, 6))
     size = draw(st.sampled_from([1.0, 0.3, 7.7, 100.0]))
@@ -292,7 +292,7 @@ def test_odd_numbers(dim: int, numbers: list[float], radius: float) -> None:
 @MANY
 @given(st.sampled_from([2, 3]), st.floats(-1, 1), st.integers(0, 2), st.booleans())
 def test_tiny_components(dim: int, along: float, axis: int, down: bool) -> None:
-    """A component that is all but zero neither hides an obstacle nor makes one up."""
+    """A component near zero neither hides an obstacle nor adds one."""
     assume(axis < dim)
     tiny = np.full(dim, 1e-300 if not down else -1e-300)
     a = np.full(dim, 5.0)
@@ -335,7 +335,7 @@ def test_box_by_hand(
     b: tuple[float, float],
     touches: bool,
 ) -> None:
-    """The cases that one would draw on a blackboard, around the box from 4 to 6."""
+    """Cases around the box from 4 to 6."""
     world = world_of(dim, boxes=[[4.0] * dim + [6.0] * dim])
     p, q = (np.array([*end, 4.0][:dim]) for end in (a, b))
     assert naive.hits(world, p, q) is touches
@@ -381,7 +381,7 @@ def test_no_obstacles(dim: int) -> None:
 
 @DIMS
 def test_obstacles_beyond_the_bounds(dim: int) -> None:
-    """ObstacleGrid outside do not matter; those that reach in do, however large they are."""
+    """Obstacles outside the bounds do not matter; those that reach inside do, at any size."""
     rng = np.random.default_rng(dim)
     beyond = [[-9.0] * dim + [-1.0] * dim, [11.0] * dim + [1e9] * dim]
     reaching = [[9.0] * dim + [1e9] * dim, [-1e9] * dim + [0.5] * dim]

@@ -2,7 +2,7 @@
 
 Worlds and segments lie on a lattice of whole numbers, segments within a map of side L, at most
 `LARGEST`. There the twins decide in int64 without rounding, and the kernel has to agree with them
-exactly, for what is no touch on a lattice is a miss by far more than the kernel's slack. Where a
+exactly, because on a lattice a miss is far larger than the kernel's slack. Where a
 segment meets the faces of a box are fractions with its components below the line: two that differ
 do so by 1 / L^2, slack is 1e-15. The square of a distance from a ball's centre has the square of
 the length below the line, so it differs from that of the radius by 1 / (3 L^2), slack is 1e-13 L^2.
@@ -44,7 +44,7 @@ def check_all(obstacles: ObstacleGrid, A: Floats, B: Floats, hits: NDArray[np.bo
 
 
 def compiled_hits(world: World, A: Array, B: Array) -> NDArray[np.bool_]:
-    """Ask the kernel about every segment."""
+    """Results of the kernel for all segments."""
     a, b = (np.ascontiguousarray(P, np.float64) for P in (A, B))
     hits = np.zeros(len(A), np.bool_)
     check_all(build_obstacle_grid(world), a, b, hits)
@@ -264,7 +264,7 @@ Built = Callable[[World, float], World]
 
 @SHAPES
 def test_a_million_segments_on_a_lattice(draw: Draw, dim: int, built: Built) -> None:
-    """The kernel agrees exactly, both ways round; the million has enough of what is hard."""
+    """The kernel agrees exactly, both ways round; the million has enough grazing segments."""
     rng = np.random.default_rng(dim)
     seen = np.zeros(3)
     for k in range(WORLDS):
@@ -281,30 +281,30 @@ def test_a_million_segments_on_a_lattice(draw: Draw, dim: int, built: Built) -> 
 
 @SHAPES
 def test_segments_in_floats(draw: Draw, dim: int, built: Built) -> None:
-    """Twins in floats decide about all but the few whose gap may be rounding; fractions there.
+    """Twins in floats decide, except where the gap may be a rounding error; there fractions do.
 
-    What touches is never called free, and what is called a hit at least nearly touches.
+    A segment that touches is never free, and a hit at least nearly touches.
     """
     rng = np.random.default_rng(10 + dim)
     close = 0
     for _ in range(WORLDS // 4):
         lattice = draw(rng, dim, SIXTHS)
         world, (a, b) = scaled(lattice, SIXTH), floats(rng, lattice, SEGMENTS)
-        gap, said = world_gap(world, a, b), compiled_hits(built(lattice, SIXTH), a, b)
-        wrong = (said != (gap < 0)) & (abs(gap) > NEAR)
+        gap, hit = world_gap(world, a, b), compiled_hits(built(lattice, SIXTH), a, b)
+        wrong = (hit != (gap < 0)) & (abs(gap) > NEAR)
         assert not wrong.any(), f"wrong: {example(world, a, b, wrong)}"
         for i in np.flatnonzero(abs(gap) <= NEAR):
             touches = naive.hits(world, a[i], b[i])
-            right = touches if said[i] else not touches
-            nearly = said[i] and naive.nearly_hits(world, a[i], b[i])
-            assert right or nearly, f"{said[i]} from {a[i].tolist()} to {b[i].tolist()}: {world}"
+            right = touches if hit[i] else not touches
+            nearly = hit[i] and naive.nearly_hits(world, a[i], b[i])
+            assert right or nearly, f"{hit[i]} from {a[i].tolist()} to {b[i].tolist()}: {world}"
             close += 1
     assert close > 50
 
 
 @SHAPES
 def test_twins_against_fractions(draw: Draw, dim: int, built: Built) -> None:
-    """The twins say what fractions say, wherever they say it by other formulas."""
+    """The twins, which use other formulas, agree with fractions."""
     rng = np.random.default_rng(20 + dim)
     for side in SIDES:
         for _ in range(4):

@@ -27,7 +27,7 @@ WIDE = (
 
 
 def values(fields: tuple[Field, ...]) -> dict[str, Any]:
-    """A value for each field, none of which is another field's."""
+    """A different value for each field."""
     found: dict[str, Any] = {}
     for i, f in enumerate(fields, 1):
         others = {"q": Q[i], "q[]": Q[i : i + 2], "bool": True}
@@ -36,7 +36,7 @@ def values(fields: tuple[Field, ...]) -> dict[str, Any]:
 
 
 def arguments(buffer: emit.Buffer, fields: tuple[Field, ...]) -> list[Any]:
-    """The same values as the arguments of a kind's function; waypoints stand in the buffer."""
+    """The same values as the arguments of a kind's function; waypoints are put into the buffer."""
     found: list[Any] = []
     for i, (f, value) in enumerate(zip(fields, values(fields).values(), strict=True), 1):
         if f.type == "q":
@@ -62,7 +62,7 @@ def callable_from_python(emit: ModuleType, kind: Kind) -> Any:
 
 
 def check_round_trip(emit: ModuleType, event_log: ModuleType, kind: Kind) -> None:
-    """From a kernel, and from Python, every field comes back as it was given."""
+    """Every field of an event of a kernel and of Python has its value in the table."""
     log, fields = event_log.EventLog(DOF, logical_clock=True), FIELDS[kind]
     call = callable_from_python(emit, kind)
     for iteration in (1, 2):
@@ -84,7 +84,7 @@ def test_every_field_comes_back(kind: Kind) -> None:
 
 @pytest.fixture
 def wide(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[ModuleType, ModuleType]]:
-    """Return the modules as they are where a kind has two numbers, configurations and paths."""
+    """Load the modules with a kind that has two numbers, configurations and paths."""
     monkeypatch.setitem(FIELDS, Kind.CONNECT, WIDE)
     table_dtype.cache_clear()
     modules = []
@@ -103,7 +103,7 @@ def wide(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[ModuleType, ModuleTy
 def test_a_kind_may_have_two_numbers_and_two_configurations(
     wide: tuple[ModuleType, ModuleType],
 ) -> None:
-    """Once, all floats of a kind had one column, and all configurations; now none is lost."""
+    """Neither of two floats, configurations or paths of a kind is lost."""
     check_round_trip(*wide, Kind.CONNECT)
     check_round_trip(*wide, Kind.EDGE)
 

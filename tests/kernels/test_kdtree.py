@@ -57,7 +57,7 @@ def nearest_of_all(
 
 
 def test_python_is_refused() -> None:
-    """What only kernels may call says so; without its wrapper a call would be a crash."""
+    """A call from Python is an error; without a wrapper it would crash."""
     points = np.zeros((2, 2))
     tree, space = rooted_kdtree(points[:1], 4), space_of(2)
     nearest_of_all(tree, space, points, np.zeros(2, np.int64))
@@ -85,7 +85,7 @@ def found(tree: KdTree, queries: Floats) -> NDArray[np.int64]:
 
 
 def check(tree: KdTree, points: Floats, queries: Floats) -> None:
-    """Hold the tree's answers to brute force: no other point is nearer."""
+    """Compare the tree with brute force: no other point is nearer."""
     for query, node in zip(queries, found(tree, queries), strict=True):
         assert 0 <= node < len(points)
         squares = naive.squared_distances(points, query)
@@ -156,7 +156,7 @@ coordinate = st.integers(0, 4).map(float) | st.integers(0, 3).map(
 @settings(max_examples=150, deadline=None)
 @given(st.data(), st.sampled_from([2, 3]), st.integers(1, 80))
 def test_any_points(data: st.DataObject, dim: int, n: int) -> None:
-    """Equal and all but equal points, in any order."""
+    """Equal and nearly equal points, in any order."""
     numbers = data.draw(st.lists(coordinate, min_size=dim, max_size=24))
     order = data.draw(st.integers(0, 2**32 - 1))
     points = np.random.default_rng(order).choice(numbers, (n, dim))
@@ -271,7 +271,7 @@ def planted_each(points: Floats, roots: NDArray[np.int64], capacity: int = 4) ->
 def check_near(
     tree: KdTree, points: Floats, roots: NDArray[np.int64], queries: Floats, radii: Floats
 ) -> None:
-    """Hold what is near in each tree, and how far, to brute force."""
+    """Compare the near nodes of each tree and their distances with brute force."""
     space, nodes = space_of(points.shape[1]), np.empty(len(points), np.int32)
     far = np.empty(len(points))
     for row, query in enumerate(queries):
@@ -325,7 +325,7 @@ def test_trees_that_share_their_room_grow(dim: int) -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.data(), st.sampled_from([2, 3]), st.integers(2, 60))
 def test_near_any_points(data: st.DataObject, dim: int, n: int) -> None:
-    """Equal and all but equal points: all within the radius, or 16 equal ones in their place."""
+    """Equal and nearly equal points: all within the radius, or 16 of the equal ones."""
     numbers = data.draw(st.lists(coordinate, min_size=dim, max_size=24))
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     points = rng.choice(numbers, (n, dim))

@@ -38,7 +38,7 @@ def fill_informed(space: PointSpace, draws: Random, ends: Floats, best: float, o
 def fill_by_rejection(
     space: PointSpace, draws: Random, ends: Floats, best: float, out: Floats
 ) -> None:
-    """The same from all of the bounds, and thrown away where they are of no use."""
+    """The same from all of the bounds, with rejection."""
     row = 0
     while row < len(out):
         sample_uniform(space, draws, out, row)
@@ -48,7 +48,7 @@ def fill_by_rejection(
 
 
 def drawn(rng: np.random.Generator, n: int) -> Floats:
-    """Numbers that kernels draw from a generator, which then goes on behind them."""
+    """Numbers that kernels draw from a generator, which then continues after them."""
     out, draws = np.empty(n), copy_state(rng)
     fill(draws, out)
     restore_state(draws, rng)
@@ -63,7 +63,7 @@ def pcg(seed: int) -> np.random.Generator:
 @FEW
 @given(st.integers(0, 2**128), st.lists(st.integers(0, 300), min_size=1, max_size=5))
 def test_the_same_bits_as_numpy(seed: int, counts: list[int]) -> None:
-    """Kernels and Python take turns drawing, and neither can tell."""
+    """Kernels and Python draw in turns from one stream."""
     ours, theirs = pcg(seed), pcg(seed)
     for number, n in enumerate(counts):
         mine = drawn(ours, n) if number % 2 == 0 else ours.random(n)
@@ -163,7 +163,7 @@ def test_informed_samples_lie_in_the_ellipse(
 
 
 def aspects(ends: Floats, q: Floats) -> list[Floats]:
-    """Numbers that tell where configurations lie: along each axis, around and along the ellipse."""
+    """Statistics of the configurations: along each axis, around and along the ellipse."""
     centre = ends.mean(axis=0)
     return [
         *q.T,

@@ -46,7 +46,7 @@ def walled(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def settings_of(run: Run) -> dict[str, Any]:
-    """The planner's settings, those of `rrt-connect` as the variant that it stands for."""
+    """The planner's settings, `rrt-connect` as a variant of bi-rrt."""
     planner = make_planner(run.manifest.scenario)
     given = planner.as_dict()
     usual = BiRRT(link="connect" if run.manifest.scenario.planner == "rrt-connect" else "extend")
@@ -148,7 +148,7 @@ def check_turns(run: Run, events: Events) -> None:
 
 
 def check_all(run: Run, events: Events) -> None:
-    """Everything that holds for every run without smoothing that no clock ended."""
+    """Properties of every run without smoothing and without a time limit."""
     check_log(events)
     check_trees(run, events)
     check_end(run, events)
@@ -157,7 +157,7 @@ def check_all(run: Run, events: Events) -> None:
 
 
 def twin_of(run: Run, events: Events) -> list[twins.Event]:
-    """What the slow twin says in the same run."""
+    """The events of the slow twin in the same run."""
     twin = twins.BiRRT(run.problem, run.manifest.scenario.seed, settings_of(run))
     return twin.run(
         len(events[Kind.SAMPLE]) if status(events) is Status.SOLVED else run.stop.iterations
@@ -186,10 +186,10 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 @FEW
 @given(scenarios())
 def test_contract_and_twin(scenario: Scenario) -> None:
-    """Everything that is promised, and event by event what the slow twin says."""
+    """All properties, and the events of the slow twin one by one."""
     run, events = planned(scenario)
     check_all(run, events)
-    assert twins.told(events) == twin_of(run, events)
+    assert twins.rows_of(events) == twin_of(run, events)
 
 
 @pytest.mark.parametrize("grow", VARIANTS["grow"])
@@ -202,7 +202,7 @@ def test_twin_in_a_longer_run(grow: str, link: str, turn: str, world: str) -> No
     scenario = plain(world, planner="bi-rrt", params={"step": 2.0, **params}, iterations=200)
     run, events = planned(scenario)
     check_all(run, events)
-    assert twins.told(events) == twin_of(run, events)
+    assert twins.rows_of(events) == twin_of(run, events)
     assert len(events[Kind.EDGE]) > 30
     assert len(events[Kind.PATH]) or len(events[Kind.SAMPLE]) == 200
 
@@ -227,7 +227,7 @@ def test_a_coin_decides_who_grows(walled: str, link: str) -> None:
 
 
 def test_the_smaller_tree_grows(tmp_path: Path) -> None:
-    """A tree that is held up in a pocket is always the one to try, until it is the larger."""
+    """A tree that is stuck in a pocket is extended until it is the larger one."""
     pocket = np.array([[1, 1, 3, 1.2], [1, 2.8, 3, 3], [1, 1, 1.2, 3], [2.8, 1.9, 3, 3.0]])
     path = tmp_path / "pocket.json"
     ends: dict[str, Any] = {"start": np.array([2.0, 2.0]), "goal": np.array([8.0, 8.0])}

@@ -118,7 +118,7 @@ def test_a_path_of_one_waypoint_needs_no_move() -> None:
 
 @pytest.mark.parametrize("cut", [0, 1, 3])
 def test_an_interrupted_robot_stops(cut: int) -> None:
-    """Interrupted after a batch, the moves made up to then stand, and the phase ends."""
+    """If interrupted after a batch, the run keeps the moves so far, and the phase ends."""
     path = np.array([[0.0, 0.0], [90.0, 0.0]])
     space = make_space(Point(), World("empty", np.zeros(2), np.full(2, 100.0)))
     log, stop = EventLog(2, 10, logical_clock=True), Stop(interrupted=cut == 0)
@@ -175,7 +175,7 @@ def test_driving_does_not_touch_the_plan(planner: str) -> None:
 
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_nobody_moves_without_a_path(planner: str) -> None:
-    """A run that found nothing says nothing of driving."""
+    """A run without a path has no events of the execution."""
     scenario = scenario_of(planner, iterations=1, world="circles2d:n=20,seed=2", smooth=True)
     _, events = planned(scenario)
     assert not len(events[Kind.PATH])
@@ -184,7 +184,7 @@ def test_nobody_moves_without_a_path(planner: str) -> None:
 
 
 def test_nobody_moves_once_interrupted() -> None:
-    """Interrupted while smoothing, the run does not begin to drive."""
+    """Interrupted while smoothing, the run does not begin to execute."""
     run = Run(scenario_of("rrt", smooth=True))
     batches = []
     for batch in run.events():

@@ -31,7 +31,7 @@ from brrt.scenario.scenario import Scenario
 from brrt.worlds import World
 from tests.conftest import Result
 from tests.support import naive
-from tests.support.naive_lattice import Said, Twin, costs_to_go
+from tests.support.naive_lattice import Emitted, Twin, costs_to_go
 
 Floats = NDArray[np.float64]
 
@@ -70,9 +70,9 @@ def twin_of(problem: Problem, planner: AStar | LRTAStar) -> Twin:
     return Twin(problem.world, problem.start, problem.goal, free, **options)
 
 
-def said(events: Events) -> list[Said]:
-    """All that the twin says too, in the order of the log."""
-    rows: list[tuple[int, Said]] = []
+def emitted(events: Events) -> list[Emitted]:
+    """The events that the twin emits too, in the order of the log."""
+    rows: list[tuple[int, Emitted]] = []
     for kind in (Kind.EXPAND, Kind.REJECT, Kind.HEURISTIC, Kind.MOVE):
         names = [f.name for f in FIELDS[kind] if f.name != "q"]
         for event in events[kind]:
@@ -127,7 +127,7 @@ def test_lrta_star_is_its_twin(
         if length is None:
             break
         lengths.append(length)
-    assert said(events) == twin.said
+    assert emitted(events) == twin.emitted
     assert events[Kind.PATH]["cost"].tolist() == lengths
     solvable = 0 in costs_to_go(twin_of(problem, planner))
     assert status(events) is (Status.SOLVED if solvable else Status.NO_PATH)
@@ -140,7 +140,7 @@ def test_a_star_is_its_twin_and_optimal(problem: Problem, options: dict[str, Any
     planner = AStar(**options)
     events, twin = planned(planner, problem), twin_of(problem, planner)
     found = twin.search(0, math.inf)
-    assert said(events) == twin.said
+    assert emitted(events) == twin.emitted
     least = costs_to_go(twin_of(problem, planner))
     if found is None:
         assert status(events) is Status.NO_PATH
@@ -152,7 +152,7 @@ def test_a_star_is_its_twin_and_optimal(problem: Problem, options: dict[str, Any
 
 
 def check_paths(problem: Problem, planner: AStar | LRTAStar, events: Events) -> None:
-    """Paths lead from start to goal, are free, go from cell to cell, and are as long as said."""
+    """Paths lead from start to goal, are free, go from cell to cell, and have the stated length."""
     for path in events[Kind.PATH]:
         q = path["waypoints"]
         assert path["stage"] == Stage.RAW
@@ -174,7 +174,7 @@ def check_paths(problem: Problem, planner: AStar | LRTAStar, events: Events) -> 
 def test_lrta_star_keeps_its_promises(
     problem: Problem, options: dict[str, Any], lookahead: int
 ) -> None:
-    """Estimates rise and stay admissible; moves go where the estimates say, at most N cells on."""
+    """Estimates rise and stay admissible; moves follow the estimates, by at most N cells."""
     planner = LRTAStar(**options, lookahead=lookahead, trials=3)
     events = planned(planner, problem)
     check_paths(problem, planner, events)
@@ -206,10 +206,10 @@ def test_lrta_star_keeps_its_promises(
 def test_trials_converge_to_the_shortest_path(
     problem: Problem, options: dict[str, Any], lookahead: int
 ) -> None:
-    """With what was learnt kept, the robot comes to walk as A* plans.
+    """If it keeps what it learned, the robot finally moves along a path of A*.
 
-    How many trials that takes nobody can say; but once a trial teaches nothing, it and all that
-    follow are shortest, and that comes in the end.
+    The number of trials is not known in advance; but once a trial teaches nothing, it and all that
+    follow are shortest.
     """
     best = planned(AStar(**options), problem)[Kind.PATH]["cost"]
     for trials in (200, 2_000, 20_000):
@@ -245,7 +245,7 @@ def test_batches_never_change_the_log(
 def test_a_run_that_is_cut_is_the_beginning_of_the_whole(
     problem: Problem, options: dict[str, Any], lookahead: int, cut: int, batch: int
 ) -> None:
-    """A budget ends the run where it says; an interrupted run is a run of that budget."""
+    """A budget ends the run exactly; an interrupted run equals a run with that budget."""
     for planner in (LRTAStar(**options, lookahead=lookahead, trials=2), AStar(**options)):
         whole = planned(planner, problem)
         allowed = planned(planner, problem, stop=Stop(iterations=cut))
@@ -339,7 +339,7 @@ def test_refuses_what_it_cannot_plan_for(planner: AStar | LRTAStar) -> None:
 
 
 def test_contract() -> None:
-    """What they can be held to."""
+    """Their contracts."""
     world = World("empty", np.zeros(2), np.full(2, 10.0))
     problem = Problem(world, Point(), np.array([1.0, 1.0]), np.array([9.0, 9.0]))
     grid = LRTAStar(epsilon=0.25, lookahead=3).contract(problem).lattice
@@ -412,7 +412,7 @@ def digest() -> str:
     for planner in (
         LRTAStar(trials=2), LRTAStar(lookahead=7, diagonals=True, epsilon=1.0), AStar(),
     ):  # fmt: skip
-        total.update(repr(said(planned(planner, problem))).encode())
+        total.update(repr(emitted(planned(planner, problem))).encode())
     return total.hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""Paths on real grid maps, held to what their authors state and to the shortest there can be."""
+"""Paths on real grid maps, compared with their authors' lengths and with lower bounds."""
 
 from pathlib import Path
 from typing import Any

@@ -204,7 +204,7 @@ def check_phases(run: Run, events: Events) -> None:
 
 
 def check_all(run: Run, events: Events) -> None:
-    """Everything that holds for every run without smoothing that no clock ended."""
+    """Properties of every run without smoothing and without a time limit."""
     check_log(events)
     check_phases(run, events)
     check_samples(run, events)
@@ -306,7 +306,7 @@ def test_real_time_rises_and_changes_nothing_else(world: str, walled: str) -> No
 
 
 def bounds_of_binomial(n: int, p: float, alarm: float = 1e-9) -> tuple[int, int]:
-    """Numbers of successes in n trials that are left or right of all but `alarm` of the chance."""
+    """Numbers of successes in n trials outside of which the probability is `alarm`."""
     chance = np.array(
         [
             math.exp(
@@ -323,7 +323,7 @@ def bounds_of_binomial(n: int, p: float, alarm: float = 1e-9) -> tuple[int, int]
 @pytest.mark.parametrize("bias", [0.01, 0.05, 0.5])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_goal_bias(walled: str, bias: float, seed: int) -> None:
-    """The goal is drawn as often as asked for (false alarm 1e-9)."""
+    """The goal is drawn with the requested probability (false alarm 1e-9)."""
     n = 4000
     _, events = planned(plain(walled, params={"goal_bias": bias}, iterations=n, seed=seed))
     low, high = bounds_of_binomial(n, bias)

@@ -45,7 +45,7 @@ optimality = benchmark("optimality")
 
 
 def promise(run: Run) -> Contract:
-    """What the planner says that it can be held to."""
+    """The contract of the planner."""
     return make_planner(run.manifest.scenario).contract(run.problem)
 
 
@@ -60,7 +60,7 @@ def distances(a: Floats, b: Floats) -> Floats:
 
 
 class Fold:
-    """Trees as they stand after each event; costs are worked out anew from parents alone."""
+    """The trees after each event; costs are computed from the parents."""
 
     def __init__(self, run: Run, events: Events) -> None:
         self.run, self.world, self.promise = run, run.problem.world, promise(run)
@@ -126,7 +126,7 @@ class Fold:
         self.links.append((node, other))
 
     def path(self, event: np.void) -> None:
-        """A path is better than the one before, free, and leads along the trees as they stand."""
+        """A path is better than the one before, free, and leads along the trees at that time."""
         problem, waypoints = self.run.problem, event["waypoints"]
         assert event["stage"] == (Stage.RAW if self.best == np.inf else Stage.IMPROVED)
         assert event["cost"] < self.best
@@ -140,7 +140,7 @@ class Fold:
         assert self.best >= straight * (1 - ROUNDING)
 
     def reject(self, event: np.void) -> None:
-        """What was given up was in the way of something, or of no use."""
+        """A rejected extension collides, makes no progress or has no gain."""
         tree = int(event["tree"])
         q = self.q[tree][event["node"]]
         if event["reason"] == Reason.NO_PROGRESS:
@@ -154,7 +154,7 @@ class Fold:
 
 
 def check_all(run: Run, events: Events) -> None:
-    """Everything that holds for every run without smoothing."""
+    """Properties of every run without smoothing."""
     check_log(events)
     check_samples(run, events)
     phases = events[Kind.PHASE]
@@ -200,7 +200,7 @@ TWINS = {"rrt-star": twins.RRTStar, "bi-rrt-star": twins.BiRRTStar}
 
 
 def twin_of(run: Run) -> list[twins.Event]:
-    """What the slow twin says in the same run."""
+    """The events of the slow twin in the same run."""
     scenario, near = run.manifest.scenario, promise(run).near
     assert near is not None
     settings = make_planner(scenario).as_dict()
@@ -234,10 +234,10 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 @FEW
 @given(scenarios())
 def test_contract_and_twin(scenario: Scenario) -> None:
-    """Everything that is promised, and event by event what the slow twin says."""
+    """All properties, and the events of the slow twin one by one."""
     run, events = planned(scenario)
     check_all(run, events)
-    assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
+    assert twins.in_order(twins.rows_of(events)) == twins.in_order(twin_of(run))
 
 
 @pytest.mark.parametrize("planner", sorted(TWINS))
@@ -254,7 +254,7 @@ def test_twin_in_a_longer_run(planner: str, informed: bool, world: str, step: fl
     near = promise(run).near
     assert near is not None
     assert near.radius(np.array([350]))[0] < step
-    assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
+    assert twins.in_order(twins.rows_of(events)) == twins.in_order(twin_of(run))
     assert {Reason.COLLISION, Reason.NEAR_BLOCKED} <= set(events[Kind.REJECT]["reason"].tolist())
     assert (events[Kind.PATH]["stage"] == Stage.IMPROVED).sum() > 3
     assert len(events[Kind.REWIRE]) > 100
@@ -272,7 +272,7 @@ def test_twin_where_nothing_can_be_gained(planner: str, apart: float) -> None:
     )  # fmt: skip
     run, events = planned(scenario)
     check_all(run, events)
-    assert twins.in_order(twins.told(events)) == twins.in_order(twin_of(run))
+    assert twins.in_order(twins.rows_of(events)) == twins.in_order(twin_of(run))
     futile = np.isin(events[Kind.REJECT]["reason"], [Reason.NO_GAIN, Reason.NO_PROGRESS])
     assert futile.sum() > 10
     assert not (events[Kind.PATH]["stage"] == Stage.IMPROVED).any()
@@ -296,7 +296,7 @@ def test_goal_within_reach_is_the_next_sample() -> None:
 
 @pytest.mark.parametrize("bias", [0.05, 0.5])
 def test_goal_bias(bias: float) -> None:
-    """Without a path the goal is drawn as often as asked for (false alarm 1e-9)."""
+    """Without a path the goal is drawn with the requested probability (false alarm 1e-9)."""
     n = 3000
     scenario = plain(
         "circles2d:n=0", planner="rrt-star", params={"goal_bias": bias, "step": 1e-3}, iterations=n
@@ -312,7 +312,7 @@ def test_goal_bias(bias: float) -> None:
 def test_paths_come_close_to_the_optimum(
     dim: int, few: int, most: int, name: str, tmp_path: Path
 ) -> None:
-    """Over 20 seeds the median falls to within 2 % of the optimum, and informed is ahead of plain.
+    """Over 20 seeds the median is within 2 % of the optimum, and informed is better than plain.
 
     In space plain sampling fills the bounds so slowly that 16,000 iterations leave it 2 to 6 %
     above the optimum (`benchmarks/optimality.py`); there its cost has to fall, and informed

@@ -69,7 +69,7 @@ def replayed(world: World, raw: Floats, attempts: NDArray[np.void]) -> Floats:
 
 
 def check(world: World, raw: Floats, events: Events, attempts: int) -> Floats:
-    """Everything that holds for every smoothing; returns the smoothed path."""
+    """Check the properties of every smoothing; return the smoothed path."""
     shortcuts = events[Kind.SHORTCUT]
     (path,) = (event for event in events[Kind.PATH] if event["stage"] == Stage.SMOOTHED)
     result = np.array(path["waypoints"])
@@ -170,7 +170,7 @@ def test_batches_change_nothing(capacity: int) -> None:
 
 
 def test_an_interruption_keeps_what_is_done() -> None:
-    """Interrupted, the path as it stands is the result, and the phase says so."""
+    """If interrupted, the result is the path so far, and the status is `interrupted`."""
     stop = Stop(interrupted=True)
     events = smoothed(BLOCKED, ring(), attempts=1000, capacity=20, stop=stop)
     assert events[Kind.PHASE]["status"].tolist() == [Status.BEGIN, Status.INTERRUPTED]

@@ -1,4 +1,4 @@
-"""What holds for every planner that grows trees in a compiled loop."""
+"""Properties of all planners that grow trees."""
 
 import json
 import os
@@ -70,7 +70,7 @@ def check_contract(run: Run, events: Events) -> None:
 
 
 def without_end(events: Events) -> Events:
-    """The log without its last event, which says how planning ended."""
+    """The log without its last event, the end of planning."""
     return events.until(seq=len(events) - 2)
 
 
@@ -99,7 +99,7 @@ def test_paths_longer_than_a_batch(planner: str, params: dict[str, Any], batch: 
 
 
 def test_many_better_paths_in_small_batches() -> None:
-    """Links are looked at in turn: the loop must not look twice where a path had to wait."""
+    """The loop must not check a link twice if a path has to wait for room."""
     scenario = plain(
         "circles2d:n=60,seed=1", planner="bi-rrt-star", params={"step": 8.0}, iterations=4000
     )
@@ -276,11 +276,11 @@ PLAIN_PYTHON = """
 import json, sys
 from brrt import Run, Scenario
 from brrt.events import Events
-from tests.support.twins import told
+from tests.support.twins import rows_of
 logs = []
 for text in json.load(sys.stdin):
     run = Run(Scenario.parse(text))
-    logs.append(told(Events.concat(run.problem.dof, run.events())))
+    logs.append(rows_of(Events.concat(run.problem.dof, run.events())))
 json.dump(logs, sys.stdout)
 """
 
@@ -308,7 +308,7 @@ def test_kernels_run_as_plain_python_bit_for_bit() -> None:
     kinds, sources = set[Kind](), set[int]()
     for scenario, log in zip(wanted, logs, strict=True):
         events = planned(scenario)[1]
-        assert log == json.loads(json.dumps(twins.told(events))), scenario
+        assert log == json.loads(json.dumps(twins.rows_of(events))), scenario
         kinds |= set(events.counts)
         sources |= set(events[Kind.SAMPLE]["source"].tolist())
     assert kinds >= {Kind.REWIRE, Kind.CONNECT, Kind.MOVE, Kind.SHORTCUT, Kind.PATH}

@@ -1,4 +1,4 @@
-"""Slow twins: exact, brute force, obvious at a glance. The other tests hold brrt to them.
+"""Slow twins: exact, brute force, simple to verify; the other tests compare brrt with them.
 
 Floats are rational numbers, so `Fraction` decides every question about them without rounding.
 """
@@ -120,8 +120,8 @@ def hull_distance(one: Floats, other: Floats) -> Floats:
     cross or a vertex lies inside.
 
     Args:
-        one: Vertices counter-clockwise at each of t moments, shape (t, k, 2).
-        other: Vertices of the other, at each moment or once for all, shape (t or 1, m, 2).
+        one: Vertices counter-clockwise at each of t times, shape (t, k, 2).
+        other: Vertices of the other, at each time or constant, shape (t or 1, m, 2).
     """
     one, other = one[:, :, None, :], other[:, None, :, :]
     p, q = (one, np.roll(one, -1, axis=1)), (other, np.roll(other, -1, axis=2))
@@ -256,7 +256,7 @@ def path_length(waypoints: Floats) -> float:
 
 
 def assert_same(one: Events, other: Events) -> None:
-    """Two logs are equal bit by bit, field by field: what lies between the fields is nobody's."""
+    """Two logs are equal bit by bit, field by field: padding between the fields does not count."""
     assert one.tables.keys() == other.tables.keys()
     for kind, table in one.tables.items():
         twin = other.tables[kind]

@@ -12,12 +12,12 @@ from brrt.events import Kind, Reason
 from brrt.worlds import World
 
 Floats = NDArray[np.float64]
-Said = tuple[Kind, int, tuple[float, ...], tuple[float, ...]]
+Emitted = tuple[Kind, int, tuple[float, ...], tuple[float, ...]]
 """Kind, iteration, the other fields in their order, and q."""
 
 
 class Twin:
-    """The lattice and what is learnt on it; what happens is appended to `said`."""
+    """The lattice and its estimates; events are appended to `emitted`."""
 
     def __init__(
         self, world: World, start: Floats, goal: Floats, free: Callable[[Floats, Floats], bool],
@@ -39,7 +39,7 @@ class Twin:
         self.near: dict[int, list[tuple[int, float]]] = {}
         self.arrives: set[int] = set()
         self.moves = 0
-        self.said: list[Said] = []
+        self.emitted: list[Emitted] = []
 
     def straight(self, q: Floats) -> float:
         """Distance to the goal."""
@@ -52,9 +52,9 @@ class Twin:
         """Position of a cell."""
         return self.start + self.epsilon * np.array(at)
 
-    def say(self, kind: Kind, *fields: float, q: Floats) -> None:
+    def emit(self, kind: Kind, *fields: float, q: Floats) -> None:
         """Append an event."""
-        self.said.append((kind, self.moves, fields, tuple(q.tolist())))
+        self.emitted.append((kind, self.moves, fields, tuple(q.tolist())))
 
     def look(self, cell: int) -> None:
         """Find a cell's neighbours, unless the goal is in reach."""
@@ -70,9 +70,9 @@ class Twin:
             q = self.q(there)
             first, second = sorted((here, there), key=lambda at: at[::-1])
             if not self.world.inside(q):
-                self.say(Kind.REJECT, 0, cell, Reason.LIMITS, q=q)
+                self.emit(Kind.REJECT, 0, cell, Reason.LIMITS, q=q)
             elif not self.free(self.q(first), self.q(second)):
-                self.say(Kind.REJECT, 0, cell, Reason.COLLISION, q=q)
+                self.emit(Kind.REJECT, 0, cell, Reason.COLLISION, q=q)
             else:
                 if there not in self.number:
                     self.number[there] = len(self.at)
@@ -89,7 +89,7 @@ class Twin:
             if not done:
                 if lookahead == math.inf:
                     self.moves += 1
-                self.say(Kind.EXPAND, best, parent[best], g[best], q=self.q(self.at[best]))
+                self.emit(Kind.EXPAND, best, parent[best], g[best], q=self.q(self.at[best]))
                 self.look(best)
                 done = best in self.arrives
             if done:
@@ -109,19 +109,19 @@ class Twin:
         return None
 
     def learn(self, closed: list[int]) -> None:
-        """Bellman's equations inside what was expanded, iterated until they hold."""
-        learnt = dict.fromkeys(closed, math.inf)
+        """Bellman's equations on the expanded cells, iterated until nothing changes."""
+        learned = dict.fromkeys(closed, math.inf)
         before = None
-        while before != learnt:
-            before = dict(learnt)
+        while before != learned:
+            before = dict(learned)
             for cell in closed:
-                learnt[cell] = min(
-                    cost + learnt.get(other, self.h[other]) for other, cost in self.near[cell]
+                learned[cell] = min(
+                    cost + learned.get(other, self.h[other]) for other, cost in self.near[cell]
                 )
         for cell in closed:
-            if learnt[cell] > self.h[cell]:
-                self.h[cell] = learnt[cell]
-                self.say(Kind.HEURISTIC, cell, learnt[cell], q=self.q(self.at[cell]))
+            if learned[cell] > self.h[cell]:
+                self.h[cell] = learned[cell]
+                self.emit(Kind.HEURISTIC, cell, learned[cell], q=self.q(self.at[cell]))
 
     def trial(self, number: int, lookahead: int) -> float | None:
         """Walk to the goal; return how far that was, or None where there is no way."""
@@ -135,11 +135,11 @@ class Twin:
             for target in way[1:]:
                 length += dict(self.near[cell])[target]
                 cell, step, self.moves = target, step + 1, self.moves + 1
-                self.say(Kind.MOVE, number, step, cell, length, q=self.q(self.at[cell]))
+                self.emit(Kind.MOVE, number, step, cell, length, q=self.q(self.at[cell]))
             if best in self.arrives and len(closed) < lookahead:
                 if self.h[best] > 0:
                     length, self.moves = length + self.h[best], self.moves + 1
-                    self.say(Kind.MOVE, number, step + 1, -1, length, q=self.goal)
+                    self.emit(Kind.MOVE, number, step + 1, -1, length, q=self.goal)
                 return length
 
 

@@ -1,6 +1,6 @@
-"""Planners in plain Python, for logs with every kind of event: slow, and obvious at a glance.
+"""Planners in plain Python, for logs with every kind of event: slow, and simple to verify.
 
-They stand in for planners from outside: they emit events and promise a contract, nothing else.
+They represent foreign planners: they emit events and state a contract, nothing else.
 """
 
 from collections.abc import Iterator

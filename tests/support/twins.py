@@ -1,6 +1,6 @@
 """Slow twins of the tree planners: plain Python, from the papers and the settings' docstrings.
 
-A twin draws the same random numbers as the compiled loop and says every event that it has to say.
+A twin draws the same random numbers as the compiled loop and emits the same events.
 Nearest nodes, nodes near and costs are found by looking at every node; collisions are decided by
 exact arithmetic. A log is a list of tuples: kind, iteration, and the kind's fields.
 """
@@ -22,7 +22,7 @@ Point = tuple[float, ...]
 Event = tuple[Any, ...]
 
 
-def told(events: Events) -> list[Event]:
+def rows_of(events: Events) -> list[Event]:
     """A recorded log, as twins have it."""
     rows = []
     for kind, table in events.tables.items():
@@ -73,7 +73,7 @@ def squared(a: Point, b: Point) -> float:
 
 @dataclass
 class Tree:
-    """Nodes with parents; costs are worked out when asked for."""
+    """Nodes with parents; costs are computed on demand."""
 
     q: list[Point]
     parent: list[int] = field(default_factory=lambda: [-1])
@@ -117,11 +117,11 @@ class Twin:
         self.newest = [0] * trees
         self.iteration = 0
         self.log: list[Event] = []
-        self.say(Kind.PHASE, Phase.PLAN, Status.BEGIN)
+        self.emit(Kind.PHASE, Phase.PLAN, Status.BEGIN)
         for which, tree in enumerate(self.trees):
-            self.say(Kind.EDGE, which, 0, -1, 0.0, tree.q[0])
+            self.emit(Kind.EDGE, which, 0, -1, 0.0, tree.q[0])
 
-    def say(self, kind: Kind, *fields: Any) -> None:
+    def emit(self, kind: Kind, *fields: Any) -> None:
         """Append an event."""
         self.log.append((kind, self.iteration, *fields))
 
@@ -149,7 +149,7 @@ class Twin:
         tree.q.append(q)
         tree.parent.append(parent)
         node = self.newest[which] = len(tree.q) - 1
-        self.say(Kind.EDGE, which, node, parent, tree.cost(node), q)
+        self.emit(Kind.EDGE, which, node, parent, tree.cost(node), q)
         return node
 
     def path(self, node: int, other: int | None = None) -> tuple[Point, ...]:
@@ -174,7 +174,7 @@ class BiRRT(Twin):
         while not solved and self.iteration < iterations:
             self.iteration += 1
             solved = self.iterate()
-        self.say(Kind.PHASE, Phase.PLAN, Status.SOLVED if solved else Status.ITERATION_LIMIT)
+        self.emit(Kind.PHASE, Phase.PLAN, Status.SOLVED if solved else Status.ITERATION_LIMIT)
         return self.log
 
     def iterate(self) -> bool:
@@ -183,7 +183,7 @@ class BiRRT(Twin):
         if turn == "coin" and self.random() < 0.5:
             other = 1 - self.turn
             target = self.trees[other].q[self.newest[other]]
-            self.say(Kind.SAMPLE, self.turn, Source.OTHER_TREE, target)
+            self.emit(Kind.SAMPLE, self.turn, Source.OTHER_TREE, target)
             return self.head_for_newest(self.turn)
         sizes = [len(tree.q) for tree in self.trees]
         if turn == "smaller" and sizes[0] != sizes[1]:
@@ -191,7 +191,7 @@ class BiRRT(Twin):
         elif self.iteration > 1:
             self.turn = 1 - self.turn
         sample = self.uniform()
-        self.say(Kind.SAMPLE, self.turn, Source.UNIFORM, sample)
+        self.emit(Kind.SAMPLE, self.turn, Source.UNIFORM, sample)
         grew = self.grow(self.turn, sample)
         if turn != "coin" and (grew or self.settings["always_link"]):
             return self.head_for_newest(1 - self.turn)
@@ -204,10 +204,10 @@ class BiRRT(Twin):
         while True:
             new = self.steer(tree.q[near], sample)
             if new == tree.q[near]:
-                self.say(Kind.REJECT, which, near, Reason.NO_PROGRESS, new)
+                self.emit(Kind.REJECT, which, near, Reason.NO_PROGRESS, new)
                 return grew
             if not self.free(tree.q[near], new):
-                self.say(Kind.REJECT, which, near, Reason.COLLISION, new)
+                self.emit(Kind.REJECT, which, near, Reason.COLLISION, new)
                 return grew
             near, grew = self.add(which, near, new), True
             if new == sample or self.settings["grow"] == "extend":
@@ -222,13 +222,13 @@ class BiRRT(Twin):
             new = self.steer(tree.q[near], target)
             if not self.free(tree.q[near], new):
                 reason = Reason.LINK_BLOCKED if new == target else Reason.COLLISION
-                self.say(Kind.REJECT, which, near, reason, new)
+                self.emit(Kind.REJECT, which, near, reason, new)
                 return False
             if new == target:
                 self.meet(which, near)
                 return True
             if new == tree.q[near]:
-                self.say(Kind.REJECT, which, near, Reason.NO_PROGRESS, new)
+                self.emit(Kind.REJECT, which, near, Reason.NO_PROGRESS, new)
                 return False
             near = self.add(which, near, new)
             if self.settings["link"] == "extend":
@@ -241,8 +241,8 @@ class BiRRT(Twin):
         costs = [tree.cost(end) for tree, end in zip(self.trees, self.newest, strict=True)]
         gap = distance(self.trees[0].q[ours], self.trees[1].q[theirs])
         cost = costs[0] + gap + costs[1]
-        self.say(Kind.CONNECT, ours, theirs, cost)
-        self.say(Kind.PATH, Stage.RAW, cost, self.path(ours, theirs))
+        self.emit(Kind.CONNECT, ours, theirs, cost)
+        self.emit(Kind.PATH, Stage.RAW, cost, self.path(ours, theirs))
 
 
 class Star(Twin):
@@ -258,13 +258,13 @@ class Star(Twin):
     def run(self, iterations: int) -> list[Event]:
         """The whole log of a run."""
         self.begin()
-        self.tell()
+        self.report()
         while self.iteration < iterations and not self.done:
             self.iteration += 1
             self.iterate()
-            self.tell()
+            self.report()
         status = Status.SOLVED if self.done else Status.ITERATION_LIMIT
-        self.say(Kind.PHASE, Phase.PLAN, status)
+        self.emit(Kind.PHASE, Phase.PLAN, status)
         return self.log
 
     @property
@@ -284,12 +284,12 @@ class Star(Twin):
         """The best path that is known: its cost, and where the trees are left for the goal."""
         raise NotImplementedError
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Say that there is a better path, if there is one."""
         cost, node, other = self.found()
         if cost < self.best:
             stage = Stage.RAW if self.best == math.inf else Stage.IMPROVED
-            self.say(Kind.PATH, stage, cost, self.path(node, other))
+            self.emit(Kind.PATH, stage, cost, self.path(node, other))
             self.best = cost
 
     def sample(self, which: int) -> Point:
@@ -297,7 +297,7 @@ class Star(Twin):
         informed = self.settings["informed"] and self.best < math.inf
         target = self.from_ellipsoid() if informed else self.uniform()
         source = Source.INFORMED if informed else Source.UNIFORM
-        self.say(Kind.SAMPLE, which, source, target)
+        self.emit(Kind.SAMPLE, which, source, target)
         return target
 
     def from_ellipsoid(self) -> Point:
@@ -342,16 +342,16 @@ class Star(Twin):
         nearest = tree.nearest(target)
         new = self.steer(tree.q[nearest], target)
         if new == tree.q[nearest]:
-            self.say(Kind.REJECT, which, nearest, Reason.NO_PROGRESS, new)
+            self.emit(Kind.REJECT, which, nearest, Reason.NO_PROGRESS, new)
             return None
         if (
             self.settings["informed"]
             and distance(self.start, new) + distance(new, self.goal) >= self.best
         ):
-            self.say(Kind.REJECT, which, nearest, Reason.NO_GAIN, new)
+            self.emit(Kind.REJECT, which, nearest, Reason.NO_GAIN, new)
             return None
         if not self.free(tree.q[nearest], new):
-            self.say(Kind.REJECT, which, nearest, Reason.COLLISION, new)
+            self.emit(Kind.REJECT, which, nearest, Reason.COLLISION, new)
             return None
         radius = float(self.near.radius(np.array([len(tree.q) + 1]))[0])
         near = [n for n, q in enumerate(tree.q) if distance(q, new) <= radius]
@@ -363,9 +363,9 @@ class Star(Twin):
             if tree.cost(node) + distance(new, tree.q[other]) < tree.cost(other):
                 if self.free(new, tree.q[other]):
                     tree.parent[other] = node
-                    self.say(Kind.REWIRE, which, other, node, tree.cost(other))
+                    self.emit(Kind.REWIRE, which, other, node, tree.cost(other))
                 else:
-                    self.say(Kind.REJECT, which, node, Reason.NEAR_BLOCKED, tree.q[other])
+                    self.emit(Kind.REJECT, which, node, Reason.NEAR_BLOCKED, tree.q[other])
         return node
 
     def choose_parent(
@@ -380,7 +380,7 @@ class Star(Twin):
             if self.free(tree.q[n], new):
                 return n, blocked
             blocked.add(n)
-            self.say(Kind.REJECT, which, n, Reason.NEAR_BLOCKED, new)
+            self.emit(Kind.REJECT, which, n, Reason.NEAR_BLOCKED, new)
         return nearest, blocked
 
 
@@ -410,7 +410,7 @@ class RRTStar(Star):
         ):
             self.within_reach = False
             target = self.goal
-            self.say(Kind.SAMPLE, 0, Source.GOAL, target)
+            self.emit(Kind.SAMPLE, 0, Source.GOAL, target)
         else:
             target = self.sample(0)
         node = self.extend(0, target)
@@ -453,10 +453,10 @@ class BiRRTStar(Star):
         if distance(a, b) > (self.settings["connect_distance"] or self.step):
             return
         if not self.free(a, b):
-            self.say(Kind.REJECT, 0, ours, Reason.LINK_BLOCKED, b)
+            self.emit(Kind.REJECT, 0, ours, Reason.LINK_BLOCKED, b)
             return
         self.links.append((ours, theirs))
-        self.say(Kind.CONNECT, ours, theirs, self.over((ours, theirs)))
+        self.emit(Kind.CONNECT, ours, theirs, self.over((ours, theirs)))
 
     def over(self, link: tuple[int, int]) -> float:
         """Cost of the path over a link."""
@@ -464,7 +464,7 @@ class BiRRTStar(Star):
         return one.cost(a) + distance(one.q[a], two.q[b]) + two.cost(b)
 
     def found(self) -> tuple[float, int, int | None]:
-        """The cheapest of the links, as the trees stand."""
+        """The cheapest of the links."""
         if not self.links:
             return math.inf, -1, None
         best = min(self.links, key=self.over)
