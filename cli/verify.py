@@ -99,7 +99,7 @@ def verify(
 
 def _lacks_events(recording: "Recording") -> bool:
     """Whether fewer events can be read than the metrics at the end state."""
-    stated = (recording.result or {}).get("events", 0)
+    stated: int = (recording.result or {}).get("events", 0)
     return sum(map(len, recording.batches())) < stated
 
 

@@ -14,7 +14,19 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from brrt import Events, Manifest, Memory, Metrics, RecordingError, Run, Scenario
+from brrt import (
+    Events,
+    Manifest,
+    Memory,
+    Metrics,
+    Recording,
+    RecordingError,
+    Run,
+    Scenario,
+    World,
+    verify,
+)  # fmt: skip
+from brrt.verification.result import Finding
 
 pytest_plugins = ["pytester"]
 
@@ -111,6 +123,11 @@ def result_of(manifest: Manifest, *batches: Events) -> dict[str, Any]:
     for batch in batches:
         found.write(batch)
     return found.as_dict()
+
+
+def findings_of(manifest: Manifest, world: World, log: Events) -> list[Finding]:
+    """Verify a whole log without a stored result."""
+    return verify(Recording(manifest, world, lambda: [log], {})).findings
 
 
 def recorded(scenario: Scenario, *, batch: int = 16384) -> tuple[Run, Events]:

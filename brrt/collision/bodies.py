@@ -2,8 +2,9 @@
 
 A motion is bisected (Schwarzer, Saha and Latombe 2005), for each part of the body and each thing
 that it may hit: an obstacle, the bounds, another part. A piece in whose middle the two are farther
-apart than any point can move in half of it is free; one in whose middle they touch is blocked. After `HALVINGS` bisections, which is 1024 pieces of a motion, a piece that is neither
-counts as free where a motion is said to be free, and as blocked where it is said to be blocked.
+apart than any point can move in half of it is free; one in whose middle they touch is blocked.
+After `HALVINGS` bisections, which is 1024 pieces of a motion, a piece that is neither counts as
+free where a motion is said to be free, and as blocked where it is said to be blocked.
 """
 
 from collections.abc import Iterator
@@ -14,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.robots import Chain, Polygon
 from brrt.collision.obstacles import Obstacles, near_pairs
+from brrt.robots import Chain, Polygon
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

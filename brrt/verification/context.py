@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import Obstacles, first_hits
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.tree_fold import trees_in
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contracts_of
 from brrt.scenario.query import Query
-from brrt.collision.motions import Obstacles, first_hits
 from brrt.verification.draws import DrawHistory, Drawn
 from brrt.verification.retention import KeptEvents
 from brrt.verification.timeline import Timeline

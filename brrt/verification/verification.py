@@ -1,6 +1,6 @@
-"""`verify`: judge a recording by all rules."""
+"""`verify`: judge a recording by rules."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -52,20 +52,26 @@ class Verification:
         return sorted(found, key=lambda finding: finding.seq)
 
 
-def verify(recording: Recording, *, contract: Contract | None = None) -> Verification:
-    """Judge a recording by all rules.
+def verify(
+    recording: Recording,
+    *,
+    contract: Contract | None = None,
+    rules: Sequence[type[Rule]] = RULES,
+) -> Verification:
+    """Judge a recording by rules.
 
     Args:
         recording: The recording; if its `result` is None, the run's end is not judged.
         contract: What the planner promises; by default what the recording states, or else the
             registered planner of that name; without either only what all planners promise.
+        rules: The rules; by default all.
 
     Raises:
         BrrtError: Start or goal is not free in the world, or the recording is damaged.
     """
     context = Context(recording, contract)
-    rules = [rule(context) for rule in RULES]
-    active = [rule for rule in rules if _applies(rule)]
+    made = [rule(context) for rule in rules]
+    active = [rule for rule in made if _applies(rule)]
     firsts = [first for first, _ in context.stretches[1:]]
     with np.errstate(all="ignore"):  # a log may hold any numbers
         for events in _windows(recording.batches(), firsts):
@@ -75,8 +81,8 @@ def verify(recording: Recording, *, contract: Contract | None = None) -> Verific
         context.end()
         for rule in active:
             rule.finish()
-    results = [rule.result for rule in rules]
-    missing, count = _not_judged(rules), context.kept.count
+    results = [rule.result for rule in made]
+    missing, count = _not_judged(made), context.kept.count
     return Verification(results, missing, count, context.has_contract, context.is_cut)
 
 
@@ -130,7 +136,8 @@ def _reason(rule: Rule) -> str | None:
     """Return why a rule that has examined nothing could not judge; None if that is in order."""
     context = rule.context
     if rule.needs and not context.has_contract:
-        return "no contract"
+        planner = context.manifest.scenario.planner
+        return f"the recording states no contract and planner {planner} is not registered"
     if rule.of_end and context.is_cut:
         return "the run's end is missing"
     if rule.kind not in _PARTS or rule.kind in context.kept.kinds or not _applies(rule):

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from brrt import GENERATORS, BrrtError, McapSink, Memory, Run, Scenario, World, check, read
+from brrt import GENERATORS, BrrtError, McapSink, Memory, Run, Scenario, World, read
 from brrt.views.colours import GOAL, START, Colour
 from brrt.views.matplotlib.draw_world import plot_world
 from brrt.worlds import LOADERS, Grid, load_world, make_world
-from tests.conftest import Result
+from tests.conftest import Result, findings_of
 
 Command = Callable[..., Result]
 
@@ -434,7 +434,7 @@ def test_a_world_made_by_hand_is_planned_in(tmp_path: Path) -> None:
     assert metrics.as_dict()["world"] == "my world"
     saved = read(tmp_path / "run.mcap")
     assert saved.world.to_json() == world.to_json()
-    assert check(saved.manifest, saved.world, memory.events()) == []
+    assert findings_of(saved.manifest, saved.world, memory.events()) == []
 
 
 def test_a_world_is_described_in_a_line() -> None:

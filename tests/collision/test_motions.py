@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from brrt.robots import Point
 from brrt.collision import obstacles as obstacles_module
 from brrt.collision.motions import Obstacles, all_clear, first_hits, near_pairs
+from brrt.robots import Point
 from brrt.worlds import World
 from tests.kernels.test_spaces import free
 from tests.support import naive
@@ -40,7 +40,9 @@ def test_near_is_every_pair_that_meets(seed: int, dim: int, n: int, batch: int) 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(obstacles_module, "_CANDIDATES", batch)
         patched.setattr(obstacles_module, "_PAIRS", batch)
-        found = [pair for i, j in near_pairs(low, high, obstacles) for pair in zip(i, j, strict=True)]
+        found = [
+            pair for i, j in near_pairs(low, high, obstacles) for pair in zip(i, j, strict=True)
+        ]
     meet = (low[:, None] <= obstacles.upper) & (obstacles.lower <= high[:, None])
     expected = np.argwhere(meet.all(axis=2)).tolist()
     assert sorted(map(list, found)) == expected

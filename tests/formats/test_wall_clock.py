@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from brrt import McapSink, Memory, Run, Scenario, check, first_difference, read
+from brrt import McapSink, Memory, Run, Scenario, first_difference, read, verify
 from brrt.formats.background import BackgroundSink
 from brrt.runs.branch import BranchedRun
 from brrt.views.rerun.sink import RerunSink
+from tests.conftest import findings_of
 
 DAY_NS = 86_400 * 10**9
 TODAY_NS = 1_790_000_000 * 10**9
@@ -38,7 +39,7 @@ def test_wall_clock_that_jumps(name: str, tmp_path: Path, monkeypatch: pytest.Mo
         BackgroundSink(RerunSink(run.manifest, world, path=paths[1])),
     ])  # fmt: skip
     log, epoch = memory.events(), run.manifest.epoch_ns
-    assert check(run.manifest, world, log) == []
+    assert findings_of(run.manifest, world, log) == []
     assert log.last.t < 60e9
     for path in paths:
         recording = read(path)
@@ -53,4 +54,4 @@ def test_wall_clock_that_jumps(name: str, tmp_path: Path, monkeypatch: pytest.Mo
     sink = McapSink(tmp_path / "branch.mcap", branch.manifest, world)
     branch.execute([sink])
     written = read(tmp_path / "branch.mcap")
-    assert check(written.manifest, written.world, written.events(), figures=written.result) == []
+    assert verify(written).holds

@@ -18,15 +18,15 @@ from brrt import (
     Recording,
     ReproducedRun,
     Scenario,
-    check,
     first_difference,
     read,
+    verify,
 )  # fmt: skip
 from brrt.events import Events, Phase, Status
 from brrt.runs.branch import last_complete_iteration
 from brrt.runs.run import Run
 from brrt.scenario.manifest import Manifest
-from tests.conftest import Result, recorded
+from tests.conftest import Result, findings_of, recorded
 from tests.planners import test_rrt
 from tests.planners.test_rrt import column, plain, status
 from tests.planners.test_tree_planners import scenarios as two_trees
@@ -107,7 +107,7 @@ def test_a_change_rules_from_the_branch_on(
     ).all()
     manifest = Manifest.from_strings(run.manifest.to_strings())
     assert manifest == run.manifest
-    assert check(manifest, recording.world, events) == []
+    assert findings_of(manifest, recording.world, events) == []
     again = ReproducedRun(replace(recording, manifest=manifest))
     assert first_difference([events], again.events()) is None
 
@@ -139,9 +139,9 @@ def test_a_branch_of_a_branch() -> None:
     world = recording.world
     for n, (iteration, step) in enumerate([(40, 3.0), (80, 2.0), (80, 1.0)], 1):
         run, events = child(recording, iteration=iteration, params={"step": step}, seed=n)
-        assert check(run.manifest, world, events) == []
+        assert findings_of(run.manifest, world, events) == []
         one_step = replace(run.manifest, branches=())
-        assert check(one_step, world, events)
+        assert findings_of(one_step, world, events)
         assert (
             first_difference(
                 [events], ReproducedRun(replace(recording, manifest=run.manifest)).events()
@@ -154,7 +154,7 @@ def test_a_branch_of_a_branch() -> None:
     early, events = child(recording, iteration=50)
     assert [b.iteration for b in early.manifest.branches] == [40, 50]
     assert early.manifest.scenario.params["step"] == 3.0
-    assert check(early.manifest, world, events) == []
+    assert findings_of(early.manifest, world, events) == []
 
 
 def test_a_first_path_can_be_improved() -> None:
@@ -170,7 +170,7 @@ def test_a_first_path_can_be_improved() -> None:
     assert len(more[Kind.PATH]) > 1
     never = replace(scenario, params={"stop_at_first": False})
     assert first_difference(parent(never)[0].batches(), [more]) is None
-    assert check(run.manifest, recording.world, more) == []
+    assert findings_of(run.manifest, recording.world, more) == []
 
 
 @FEW
@@ -258,7 +258,7 @@ def test_golden_recordings(name: str, tmp_path: Path) -> None:
     found = first_difference([log], written.batches())
     assert found is not None
     assert found.seq >= written.manifest.branches[0].events
-    assert check(written.manifest, written.world, written.events(), figures=written.result) == []
+    assert verify(written).holds
 
 
 def test_damaged_manifests() -> None:
@@ -322,7 +322,7 @@ def test_what_follows_planning_can_change(
     run, events = child(recording, settings={"shortcuts": 7})
     assert first_difference([parent(replace(scenario, shortcuts=7))[1]], [events]) is None
     assert len(events[Kind.SHORTCUT]) == 7
-    assert check(run.manifest, recording.world, events) == []
+    assert findings_of(run.manifest, recording.world, events) == []
     with pytest.raises(BrrtError, match=r"ended with its path|give more by --iterations"):
         BranchedRun(recording)
 

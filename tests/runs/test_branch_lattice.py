@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrt import BranchedRun, BrrtError, Kind, Recording, ReproducedRun, Scenario, check
+from brrt import BranchedRun, BrrtError, Kind, Recording, ReproducedRun, Scenario
 from brrt import first_difference as parting
 from brrt.events import Phase, Status
+from tests.conftest import findings_of
 from tests.planners.test_rrt import status
 from tests.runs.test_branch import FEW, child, last_open, parent
 from tests.support import naive
@@ -65,7 +66,7 @@ def test_a_change_rules_from_the_branch_on(
         run, events = child(recording, iteration=iteration, **how)
         shared = run.manifest.branches[-1].events
         naive.assert_same(recording.events().until(seq=shared - 1), events.until(seq=shared - 1))
-        assert check(run.manifest, recording.world, events) == []
+        assert findings_of(run.manifest, recording.world, events) == []
         assert (
             parting([events], ReproducedRun(replace(recording, manifest=run.manifest)).events())
             is None
@@ -97,7 +98,7 @@ def test_more_trials(lookahead: int) -> None:
     assert len(more[Kind.PATH]) == 3
     _, whole = parent(replace(scenario, params={**scenario.params, "trials": 3}))
     assert parting([whole], [more]) is None
-    assert check(run.manifest, recording.world, more) == []
+    assert findings_of(run.manifest, recording.world, more) == []
 
 
 def test_another_lookahead_plans_anew() -> None:
@@ -108,9 +109,9 @@ def test_another_lookahead_plans_anew() -> None:
     first = run.manifest.branches[0].events
     assert int(events[Kind.EXPAND]["seq"][events[Kind.EXPAND]["iteration"] == 2][-1]) >= first
     assert parting([log], [events]) is not None
-    assert check(run.manifest, recording.world, events) == []
+    assert findings_of(run.manifest, recording.world, events) == []
     short = replace(run.manifest, branches=())
-    assert check(short, recording.world, events) != []
+    assert findings_of(short, recording.world, events) != []
 
 
 def test_refusals() -> None:

@@ -9,7 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brrt import RRT, BrrtError, Kind, McapSink, Memory, Metrics, Run, Scenario, check, forest, read
+from brrt import (
+    RRT,
+    BrrtError,
+    Kind,
+    McapSink,
+    Memory,
+    Metrics,
+    Run,
+    Scenario,
+    forest,
+    read,
+    verify,
+)
 from brrt.events import Events, Phase, Stage, Status, table_dtype
 from brrt.kernels.event_log import EventLog
 from brrt.views.rerun.sink import RerunSink
@@ -37,17 +49,14 @@ def test_recordings_need_no_class(brrt: Callable[..., Result], files: list[Path]
     for path in files:
         recording = read(path)
         assert recording.manifest.scenario == FOREIGN
-        assert (
-            check(recording.manifest, recording.world, recording.events(), figures=recording.result)
-            == []
-        )
+        assert verify(recording).holds
         figures = brrt("replay", path, "--json").json
         assert figures["planner"] == "their-own"
         assert figures["links"] == 1
         assert brrt("replay", path, "--rrd", "again.rrd", "--force").code == 0
         done = brrt("verify", path)
         assert done.code == 0
-        assert "planner their-own is not registered and the recording states no" in done.err
+        assert "no contract and planner their-own is not" in done.out
         assert brrt("verify", path, "--json").json["planner_known"] is False
 
 

@@ -31,7 +31,7 @@ from brrt.scenario.contract import Contract, Draws, Growth, Lattice, Near, Plann
 from brrt.scenario.contracts import changes_of, contract_of, contracts_of, planner_settings
 from brrt.verification.result import RuleResult
 from brrt.verification.rules import RULES
-from tests.conftest import Result, recorded, result_of
+from tests.conftest import Result, findings_of, recorded, result_of
 from tests.support import toys
 
 GOLDEN = sorted((Path(__file__).parents[2] / "recordings").glob("*.mcap"))
@@ -114,7 +114,7 @@ def test_contracts_of_branches(tmp_path: Path) -> None:
         assert [each.draws and each.draws.goal_bias for each in (second, third)] == [0.05, 0.5]
         assert kept.ruling(3).contract == second
         assert changes_of(kept) == ("step 2, was auto", "goal_bias 0.5, was 0.05")
-        assert check(kept, run.problem.world, events) == []
+        assert findings_of(kept, run.problem.world, events) == []
 
 
 def test_old_versions_read_a_branch() -> None:

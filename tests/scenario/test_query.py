@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brrt import BrrtError, Kind, Memory, Problem, Run, Scenario, check, make_robot
-from tests.conftest import Result
+from brrt import BrrtError, Kind, Memory, Problem, Run, Scenario, make_robot
+from tests.conftest import Result, findings_of
 
 ROBOTS = {
     "point": "circles2d:n=60",
@@ -90,7 +90,7 @@ def test_rules_hold() -> None:
     for robot in ROBOTS:
         run, memory = Run(scenario(robot)), Memory()
         run.execute([memory])
-        assert check(run.manifest, run.problem.world, memory.events()) == []
+        assert findings_of(run.manifest, run.problem.world, memory.events()) == []
         assert run.manifest.start == tuple(run.problem.start.tolist())
         assert run.manifest.scenario.start == "random"
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brrt import Kind, Memory, Run, Scenario, check
+from brrt import Kind, Memory, Run, Scenario
+from tests.conftest import findings_of
 
 MAPS = Path(__file__).parents[3] / "shared" / "worlds" / "ece276b"
 QUERIES = MAPS / "queries.json"
@@ -42,7 +43,7 @@ def test_course(planner: str, name: str) -> None:
     way = np.array([run.manifest.start, *moves["q"]])
     assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() <= 1 + 1e-12
     assert way[-1].tolist() == list(run.manifest.goal)
-    assert check(run.manifest, run.problem.world, events) == []
+    assert findings_of(run.manifest, run.problem.world, events) == []
 
 
 @pytest.mark.parametrize("name", NAMES)

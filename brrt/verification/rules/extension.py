@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import towards
 from brrt.events import Kind, Reason, Source, Table
 from brrt.replay.text import vector
 from brrt.scenario.contract import Contract, Growth
-from brrt.collision.motions import towards
 from brrt.verification.context import Context
 from brrt.verification.neighbours import NeighbourSearch, nearest
 from brrt.verification.retention import SpreadRows

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.bodies import wrapping_angles
 from brrt.events import FIELDS, Events, Kind, Table
 from brrt.replay.metrics import Metrics
 from brrt.replay.text import vector
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contract_differences
 from brrt.scenario.manifest import Manifest
-from brrt.collision.bodies import wrapping_angles
 from brrt.verification.context import Context, waypoints
 from brrt.verification.rule import Rule
 from brrt.verification.tolerances import CLOSE

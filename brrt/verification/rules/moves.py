@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import towards
 from brrt.events import Kind, Phase, Status, Table
 from brrt.replay.text import vector
-from brrt.collision.motions import towards
 from brrt.verification.context import Context
 from brrt.verification.rule import Rule
 from brrt.verification.tolerances import CLOSE

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import all_clear
 from brrt.events import Events, Kind, Reason, Stage, Table, table_dtype
 from brrt.replay.text import vector
 from brrt.scenario.contract import Contract
-from brrt.collision.motions import all_clear
 from brrt.verification.context import Context
 from brrt.verification.retention import SpreadRows
 from brrt.verification.rule import ANY_PART, Rule

@@ -5,10 +5,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import all_clear
 from brrt.events import Kind, Status, Table
 from brrt.replay.text import vector
 from brrt.scenario.contract import Lattice
-from brrt.collision.motions import all_clear
 from brrt.verification.context import Context
 from brrt.verification.rule import LatticeRule
 from brrt.verification.rules.lattice import adjacent, indices

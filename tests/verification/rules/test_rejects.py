@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from brrt import Kind
-from brrt.events import Reason
 from brrt.collision.motions import Obstacles, all_clear, first_hits
+from brrt.events import Reason
 from tests.support.cases import (
     GROWTH,
     Case,
