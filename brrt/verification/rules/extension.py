@@ -28,7 +28,7 @@ _PAIRS = 2_000_000
 
 class Turns(IterationRule):
     name = "turns"
-    promise = "Of two trees the one grows whose turn it is."
+    promise = "Of two trees, that one grows whose turn it is by the contract."
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

@@ -105,7 +105,9 @@ def _first_with(keys: Ints, values: Ints) -> Ints:
 
 class Expansions(LatticeRule):
     name = "expansions"
-    promise = "A cell is reached by a free motion from an expanded neighbour; its cost is right."
+    promise = (
+        "A cell is reached by a free motion from an expanded neighbour, and its cost is correct."
+    )
 
     def judge_search(self, lattice: Lattice, table: Table) -> None:
         context = self.context
@@ -205,7 +207,7 @@ class Estimates(Rule):
 
 class EstimatesAdmissible(Rule):
     name = "estimates admissible"
-    promise = "No estimate exceeds the cost of a way to the goal that the log contains."
+    promise = "No estimate exceeds the cost of a path to the goal that the log contains."
     needs = "lattice"
 
     def finish(self) -> None:
@@ -222,7 +224,7 @@ class EstimatesAdmissible(Rule):
             table, ~context.at_most(np.asarray(table["h"]), limit),
             lambda i: (
                 f"cell {table['cell'][i]}: estimate {table['h'][i]:.12g}; "
-                f"a way to the goal costs {limit[i]:.12g}"
+                f"a path to the goal costs {limit[i]:.12g}"
             ),
         )  # fmt: skip
 

@@ -105,7 +105,7 @@ class MovesFree(MoveRule):
 
 class Arrival(Rule):
     name = "arrival"
-    promise = "A robot that is done has made its last move to the goal."
+    promise = "A robot that has arrived made its last move to the goal."
     of_end = True
 
     def finish(self) -> None:
@@ -123,7 +123,7 @@ class Arrival(Rule):
 
 class PathsWalked(Rule):
     name = "paths walked"
-    promise = "The path of a trial of a robot that learns is where it went, reported on arrival."
+    promise = "The path of a trial of LRTA* is where the robot went, reported on arrival."
     needs = "lattice"
 
     def finish(self) -> None:
@@ -153,7 +153,7 @@ class PathsWalked(Rule):
 
 class MovesAlongPath(MoveRule):
     name = "moves along path"
-    promise = "A robot that executes a path moves along it, forwards, and cuts no corner."
+    promise = "A robot that executes a path moves along it, forwards, without shortcuts."
 
     def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
         context, chosen = self.context, _along_path(self.context, table)

@@ -68,8 +68,8 @@ class PathCosts(Rule):
 class PathsImprove(Rule):
     name = "paths improve"
     promise = (
-        "The first path is raw, others cost less; planners that stop find only one, and robots "
-        "that learn one in each trial."
+        "The first path is raw, and later ones cost less. Planners that stop report one path, "
+        "LRTA* one in each trial."
     )
 
     def finish(self) -> None:

@@ -88,7 +88,7 @@ class PhaseContents(Rule):
 
 class Outcome(Rule):
     name = "outcome"
-    promise = "Planning ends as solved if and only if there is a path."
+    promise = "Planning ends as solved exactly if there is a path."
 
     def finish(self) -> None:
         phases, outcome = self.context.events[Kind.PHASE], self.context.outcome

@@ -135,7 +135,9 @@ def _possible(contract: Contract) -> list[int]:
 
 class Limits(Rule):
     name = "limits"
-    promise = "Rejections for the limits are beyond them; on a lattice no others are."
+    promise = (
+        "Motions rejected for the limits exceed them; on a lattice, no other rejected motion does."
+    )
 
     def window(self, events: Events, contract: Contract) -> None:
         context, table = self.context, events[Kind.REJECT]

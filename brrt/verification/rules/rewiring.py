@@ -112,7 +112,7 @@ def _worst(joined: Joined, wrong: Flags, gain: Floats) -> Ints:
 
 class Parents(JoinedRule):
     name = "parents"
-    promise = "A node's parent is the one of least cost, of the nodes near it that reach it."
+    promise = "A new node's parent is the near node through which it costs least."
 
     def judge_joined(self, joined: Joined, blocked: NDArray[np.uint64]) -> None:
         context, tree, at, other = self.context, joined.tree, joined.at, joined.other
@@ -129,7 +129,7 @@ class Parents(JoinedRule):
         self.judge(
             edges, (worst >= 0) | too_far,
             lambda i: (
-                f"node {edges['node'][i]} costs {cost[i]:.9g}; over node {other[worst[i]]}, which "
+                f"node {edges['node'][i]} costs {cost[i]:.9g}; through node {other[worst[i]]}, which "
                 f"is near, it would cost {through[worst[i]]:.9g}" if worst[i] >= 0
                 else f"node {edges['node'][i]} has a parent {length[i]:.9g} away; others are near"
             ),
@@ -138,7 +138,7 @@ class Parents(JoinedRule):
 
 class Rewirings(JoinedRule):
     name = "rewirings"
-    promise = "Once a node has joined, no near node that it reaches costs more than over it."
+    promise = "After a node joins, no near node would cost less through it."
 
     def judge_joined(self, joined: Joined, blocked: NDArray[np.uint64]) -> None:
         context, tree, at, other = self.context, joined.tree, joined.at, joined.other
@@ -155,7 +155,7 @@ class Rewirings(JoinedRule):
         self.judge(
             edges, worst >= 0,
             lambda i: (
-                f"node {other[worst[i]]} costs {now[worst[i]]:.9g}; over the new node "
+                f"node {other[worst[i]]} costs {now[worst[i]]:.9g}; through the new node "
                 f"{edges['node'][i]}, which is near, it would cost {through[worst[i]]:.9g}"
             ),
         )  # fmt: skip

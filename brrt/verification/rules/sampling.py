@@ -120,7 +120,7 @@ class InformedSamples(Rule):
         least = to_start + context.distance(table["q"], context.goal[None])
         self.judge(
             table, ~context.at_most(least, best),
-            lambda i: f"a path over it costs at least {least[i]:.9g}; the best, {best[i]:.9g}",
+            lambda i: f"a path through it costs at least {least[i]:.9g}; the best, {best[i]:.9g}",
         )  # fmt: skip
 
 

@@ -137,7 +137,7 @@ class ShortestPaths(LatticeRule):
         first, cost, least = cells.table[order], cost[order], least[order]
         self.judge(
             first, ~self.context.at_most(cost, least),
-            lambda i: f"cell {first['cell'][i]} costs {cost[i]:.12g}; a way costs {least[i]:.12g}",
+            lambda i: f"cell {first['cell'][i]} costs {cost[i]:.12g}; a path costs {least[i]:.12g}",
         )  # fmt: skip
 
 

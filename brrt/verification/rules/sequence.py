@@ -20,8 +20,8 @@ _NEW_NODE = (Reason.COLLISION, Reason.NO_PROGRESS, Reason.NO_GAIN)
 class Iterations(Rule):
     name = "iterations"
     promise = (
-        "Events state their iteration: the number of samples so far, or of cells that A* expands, "
-        "or of moves of a robot that learns."
+        "Events state their iteration: the number of samples so far; in A*, of expanded cells; in "
+        "LRTA*, of moves."
     )
     needs = ANY_PART
     begun, before = 0, 0
@@ -68,7 +68,7 @@ class NoDuplicates(Rule):
 
 class Extensions(IterationRule):
     name = "extensions"
-    promise = "Each sample is followed by what came of it, without gaps."
+    promise = "Each sample is followed by the events that it causes, and by no others."
 
     def judge_rows(self, rows: Table, contract: Contract, growth: Growth, *, last: bool) -> None:
         rewires = contract.near is not None

@@ -186,7 +186,9 @@ class RewiresFree(TreeRule):
 
 class Links(Rule):
     name = "links"
-    promise = "A link joins existing nodes, is free and no longer than stated; its cost is right."
+    promise = (
+        "A link joins existing nodes, is free and no longer than stated, and its cost is correct."
+    )
 
     def finish(self) -> None:
         context, links = self.context, self.context.events[Kind.CONNECT]
