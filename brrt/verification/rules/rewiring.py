@@ -129,8 +129,8 @@ class Parents(JoinedRule):
         self.judge(
             edges, (worst >= 0) | too_far,
             lambda i: (
-                f"node {edges['node'][i]} costs {cost[i]:.9g}; through node {other[worst[i]]}, which "
-                f"is near, it would cost {through[worst[i]]:.9g}" if worst[i] >= 0
+                f"node {edges['node'][i]} costs {cost[i]:.9g}; through node {other[worst[i]]}, "
+                f"which is near, it would cost {through[worst[i]]:.9g}" if worst[i] >= 0
                 else f"node {edges['node'][i]} has a parent {length[i]:.9g} away; others are near"
             ),
         )  # fmt: skip
