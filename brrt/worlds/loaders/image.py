@@ -14,10 +14,11 @@ from brrt.worlds.world import World
 
 @dataclass(frozen=True, slots=True)
 class ImageMap(Loader):
-    """2D maps drawn in a PNG, PGM, PBM, PPM, BMP or JPEG: dark pixels are blocked.
+    """2D maps drawn in a PNG, PNM, BMP, JPEG, WebP or GIF: dark pixels are blocked.
 
-    The lowest row of pixels is at y = 0, the leftmost column at x = 0. Transparent pixels are free;
-    partly transparent ones are drawn over a free background.
+    The image is read as viewers show it: turned by its EXIF orientation, of several frames the
+    first. The lowest row of pixels is at y = 0, the leftmost column at x = 0. Transparent pixels
+    are free; partly transparent ones are drawn over a free background.
     """
 
     threshold: float = param(
@@ -39,7 +40,8 @@ class ImageMap(Loader):
         free = pixels.white - pixels.grey if self.invert else pixels.grey
         blocked = free < self.threshold * pixels.white
         if pixels.alpha is not None:
-            over = free * pixels.alpha.astype(np.uint16) + np.uint16(255) * (255 - pixels.alpha)
-            blocked = over < self.threshold * 255 * 255
+            wide = np.uint16 if pixels.white == 255 else np.uint32
+            over = free * pixels.alpha.astype(wide) + wide(pixels.white) * (255 - pixels.alpha)
+            blocked = over < self.threshold * 255 * pixels.white
         cells = np.ascontiguousarray(blocked[::-1])
         return World.of_grid(str(path), Grid(cells, np.zeros(2), self.resolution))

@@ -71,7 +71,8 @@ class RosMap(Loader):
             raise BrrtError(f"{fields.where('resolution')} must be above 0, not {resolution:g}")
         x, y, yaw = fields.numbers("origin", "x, y, yaw")
         mode, negate, (occupied, free) = _mode(fields), _negate(fields), _thresholds(fields)
-        values = occupancy(self._pixels(path, fields), mode, occupied, free, negate=negate)
+        pixels = self._pixels(path, fields)
+        values = occupancy(pixels, mode, occupied, free, negate=negate)
         unknown = values == _UNKNOWN
         if mode == "trinary" and self.occupied != _HALF:
             raise BrrtError(f"{path}: occupied is for the modes scale and raw; this is trinary")
@@ -79,7 +80,9 @@ class RosMap(Loader):
         if self.unknown == "blocked":
             blocked |= unknown
         grid = Grid(np.ascontiguousarray(blocked[::-1]), np.array([x, y]), resolution, yaw)
-        notes = self._notes(path, fields, int(unknown.sum()), unknown.size)
+        notes = [*self._notes(path, fields, int(unknown.sum()), unknown.size)]
+        if pixels.turned:
+            notes.append(f"{path}: its image's EXIF orientation is ignored, as map_server does")
         return World.of_grid(str(path), grid, notes=tuple(notes))
 
     def _notes(self, path: Path, fields: "YamlFields", unknown: int, cells: int) -> Iterator[str]:
@@ -96,13 +99,13 @@ class RosMap(Loader):
 
     def _pixels(self, path: Path, fields: "YamlFields") -> Pixels:
         if self.image is not None:
-            return read_pixels(file_named_by_user(path, self.image))
+            return read_pixels(file_named_by_user(path, self.image), upright=False)
         where, name = fields.where("image"), fields.text("image")
         remedy = f"{path}:image=PATH"
         image = file_named_in(where, path, name, remedy)
         if not name or not is_file(image):
             raise BrrtError(f"{where}: the image {name[:80]!r} does not exist; give {remedy}")
-        return read_pixels(image)
+        return read_pixels(image, upright=False)
 
 
 def occupancy(
