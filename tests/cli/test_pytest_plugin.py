@@ -497,10 +497,10 @@ def test_costs_nothing_and_disturbs_nobody(pytester: pytest.Pytester, run: Pytes
     assert not done.stderr
 
 
-def test_the_example_of_the_readme(pytester: pytest.Pytester, run: Pytest) -> None:
+def test_the_example_of_the_docs(pytester: pytest.Pytester, run: Pytest) -> None:
     """It makes the two files that the text names, and passes."""
-    readme = (ROOT / "README.md").read_text()
-    found = re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
+    page = (ROOT / "docs" / "testing.md").read_text()
+    found = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     (code,) = (block for block in found if "def test_" in block)
     pytester.makepyfile(test_readme=code)
     update(run)
