@@ -10,18 +10,22 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Table
-from brrt.formats.integrity import Numbering
-from brrt.formats.mcap.messages import HEAD_BYTES, TOPICS, Channel, Layout
+from brrt.formats.integrity import MOST_BYTES, Numbering
+from brrt.formats.mcap.messages import ENCODINGS, HEAD_BYTES, TOPICS, Channel, Layout
 from brrt.formats.mcap.records import parse
+from brrt.formats.ordering import Waiting, in_order
 
 Index = Mapping[int, NDArray[np.uint64]]
 """For each channel, where its messages begin in a chunk."""
 
-_DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
-_MOST_DECLARED, _MOST_SCHEMA = 100_000, 1 << 20
-"""Schemas and channels in a file, which other tools repeat in each chunk; bytes of a schema."""
-_MOST_WALKED = 4_000_000
-"""Records of chunks without an index: a second or two."""
+DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+_MOST_DECLARED = 1 << 24
+"""Bytes of all schemas and channels that differ; there are 65,535 of each at most."""
+_MOST_WALKED, _PACKED = 4_000_000, 8
+"""Records that are no events, in chunks without an index: a second or two in any case, and one for
+so many bytes of the file."""
+_MOST_WAITING = MOST_BYTES
+"""Bytes of events that wait for earlier ones."""
 
 
 class ChunkDecoder:
@@ -33,85 +37,186 @@ class ChunkDecoder:
 
     Attributes:
         numbering: Which event comes next.
+        kinds: For each channel so far the kind of its events; None for a channel of another tool.
+        foreign: How many messages of other tools there are so far.
     """
 
     def __init__(self, dof: int, epoch_ns: int) -> None:
         self.numbering = Numbering()
+        self.kinds: dict[int, Kind | None] = {}
+        self.foreign = 0
         self._dof, self._epoch_ns = dof, epoch_ns
-        self._schemas: dict[int, str] = {}
+        self._declared: dict[tuple[int, bytes], bytes] = {}
         self._channels: dict[int, Channel] = {}
-        self._declared = self._walked = 0
+        self._declared_bytes = self._walked = self._packed = 0
+        self._waiting, self._waiting_bytes = Waiting(dof), 0
 
-    def events(self, raw: bytes, index: Index) -> Events:
+    def events(self, raw: bytes, index: Index, packed: int) -> Events:
         """Decode the messages of a chunk.
 
+        Args:
+            raw: Its records.
+            index: Where its messages begin; it may be wrong.
+            packed: Its bytes in the file.
+
+        Returns:
+            The next events, in order. There are none while an earlier event is missing, which other
+            tools may have written later.
+
         Raises:
-            BrrtError: They are not what the schemas say, or not the next events.
+            BrrtError: They are not what the schemas say, or cannot be the next events.
         """
+        self._packed += packed
         begin = self._declare_first(raw)
-        try:
-            events, size = self._decode(raw, index)
-            if begin + size == len(raw):
-                self.numbering.take(events)
-                return events
-        except BrrtError:
-            pass
-        # The index is wrong or not there, as where a file was cut after a chunk. The checksum of
-        # the chunk is right: its records lead from one to the next.
-        events, _ = self._decode(raw, self._walk(raw, begin))
+        if not self._waiting.count:
+            try:
+                tables, size = self._decode(raw, index)
+                if begin + size == len(raw):
+                    events = _as_events(self._dof, tables)
+                    self.numbering.take(events)
+                    return events
+            except BrrtError:
+                pass
+        # The index is wrong or not there, as where a file was cut after a chunk, or there are other
+        # records between the messages. The records lead from one to the next.
+        tables, _ = self._decode(raw, self._walk(raw, begin))
+        for kind, table in tables:
+            self._waiting.add(kind, table)
+        return self._next(len(raw))
+
+    def rest(self) -> Events:
+        """Return the events that wait, up to the first that is missing."""
+        events = self._waiting.before_gap(self.numbering.next)
         self.numbering.take(events)
         return events
 
-    def _decode(self, raw: bytes, index: Index) -> tuple[Events, int]:
+    def check_complete(self) -> None:
+        """Check that no events wait for one that is missing.
+
+        Raises:
+            BrrtError: Some do.
+        """
+        if self._waiting.count:
+            there = self._waiting.last + 1 - self.numbering.next
+            twice = self._waiting.count > there
+            raise BrrtError("events are there twice" if twice else "events are missing")
+
+    def _next(self, size: int) -> Events:
+        """Return the events that wait if none is missing between them, otherwise none."""
+        if self._waiting.complete(self.numbering.next):
+            events = self._waiting.events()
+            self.numbering.take(events)
+            self._waiting.clear()
+            self._waiting_bytes = 0
+            return events
+        self._waiting_bytes += size
+        if self._waiting_bytes > _MOST_WAITING:
+            raise BrrtError(
+                f"event {self.numbering.next:,} is missing, or far behind later ones: if no event "
+                "is lost, sort the file by its log times"
+            )
+        return Events(self._dof, {})
+
+    def _decode(self, raw: bytes, index: Index) -> tuple[list[tuple[Kind, Table]], int]:
         """Decode the messages of our channels; return how many bytes they are, too."""
-        tables, size = dict[Kind, Table](), 0
+        tables, size = list[tuple[Kind, Table]](), 0
         for number, offsets in index.items():
             channel = self._channels.get(number)
             if channel is not None:
-                if channel.kind in tables:
-                    raise BrrtError(f"two channels hold events of kind {channel.kind.label}")
-                tables[channel.kind], used = channel.decode(raw, offsets, self._dof, self._epoch_ns)
+                table, used = channel.decode(raw, offsets, self._dof, self._epoch_ns)
+                tables.append((channel.kind, table))
                 size += used
-        return Events(self._dof, dict(sorted(tables.items()))), size
+            elif number not in self.kinds:
+                raise BrrtError(f"a message of channel {number}, which is not declared before it")
+        return tables, size
 
     def _declare_first(self, raw: bytes) -> int:
         """Take in the schemas and channels that a chunk begins with; return where they end."""
         at = 0
-        while at + 9 <= len(raw) and raw[at] in _DECLARATIONS:
+        while at + 9 <= len(raw) and raw[at] in DECLARATIONS:
             end: int = at + 9 + struct.unpack_from("<Q", raw, at + 1)[0]
+            self._count(1)
             self._declare(raw[at], raw[at + 9 : end])
             at = end
         return at
+
+    def _count(self, number: int) -> None:
+        """Count records that are no events: an empty one is packed into less than a byte."""
+        self._walked += number
+        most = _MOST_WALKED + self._packed // _PACKED
+        if self._walked > most:
+            raise BrrtError(f"{most:,} records that are no events")
 
     def _walk(self, raw: bytes, at: int) -> Index:
         """Index the messages of a chunk by going from one record to the next."""
         found: dict[int, list[int]] = {}
         while at < len(raw):
-            self._walked += 1
-            if at + HEAD_BYTES > len(raw) or self._walked > _MOST_WALKED:
-                raise BrrtError("a chunk without its index")
-            opcode, length, channel = struct.unpack_from("<BQH", raw, at)
+            self._count(1)
+            if at + 9 > len(raw):
+                raise BrrtError("a record reaches out of its chunk")
+            opcode, length = struct.unpack_from("<BQ", raw, at)
             end = at + 9 + length
             if opcode == Opcode.MESSAGE:
-                found.setdefault(channel, []).append(at)
-            elif opcode in _DECLARATIONS:
+                if length < HEAD_BYTES - 9 or end > len(raw):
+                    raise BrrtError("a message reaches out of its chunk")
+                found.setdefault(raw[at + 9] | raw[at + 10] << 8, []).append(at)
+            elif opcode in DECLARATIONS:
                 self._declare(opcode, raw[at + 9 : end])
             at = end
+        for channel, places in found.items():
+            if channel in self._channels:
+                self._count(-len(places))
+            else:
+                self.foreign += len(places)
         return {channel: np.array(places, np.uint64) for channel, places in found.items()}
 
     def _declare(self, opcode: int, data: bytes) -> None:
-        """Take in a schema or a channel."""
-        self._declared += 1
-        if self._declared > _MOST_DECLARED or len(data) > _MOST_SCHEMA:
-            raise BrrtError("it declares more than any real file")
-        if opcode == Opcode.SCHEMA:
-            schema = parse(records.Schema, data)
-            self._schemas[schema.id] = schema.data.decode(errors="replace")
+        """Take in a schema or a channel; other tools repeat them in each chunk.
+
+        Raises:
+            BrrtError: It is damaged, or another one has its number.
+        """
+        known = self._declared.setdefault((opcode, data[:2]), data)
+        if known is not data:
+            if known != data:
+                what = "schemas" if opcode == Opcode.SCHEMA else "channels"
+                raise BrrtError(f"two {what} have the number {int.from_bytes(data[:2], 'little')}")
             return
-        channel = parse(records.Channel, data)
-        if channel.topic in TOPICS and channel.schema_id in self._schemas:
-            try:
-                layout = Layout.parse(self._schemas[channel.schema_id])
-            except (BrrtError, ValueError) as error:
-                raise BrrtError(f"the schema of {channel.topic}: {error}") from None
-            self._channels[channel.id] = Channel(channel.id, TOPICS[channel.topic], layout)
+        self._declared_bytes += len(data)
+        if self._declared_bytes > _MOST_DECLARED:
+            raise BrrtError("it declares more than any real file")
+        if opcode == Opcode.CHANNEL:
+            channel = parse(records.Channel, data)
+            self.kinds[channel.id] = kind = TOPICS.get(channel.topic)
+            if kind is not None:
+                self._channels[channel.id] = Channel(channel.id, kind, self._layout(channel))
+
+    def _layout(self, channel: records.Channel) -> Layout:
+        """Return the layout of a channel's messages.
+
+        Raises:
+            BrrtError: Its schema is not there, or not one that brrt can read.
+        """
+        number = channel.schema_id
+        data = self._declared.get((Opcode.SCHEMA, number.to_bytes(2, "little")))
+        if data is None:
+            raise BrrtError(f"{channel.topic} has schema {number}, which is not declared before it")
+        schema = parse(records.Schema, data)
+        encodings = schema.encoding, channel.message_encoding
+        if encodings != ENCODINGS:
+            raise BrrtError(
+                f"{channel.topic} is encoded as {encodings!r:.80}, brrt reads {ENCODINGS!r}"
+            )
+        try:
+            return Layout.parse(schema.data.decode(errors="replace"))
+        except (BrrtError, ValueError) as error:
+            raise BrrtError(f"the schema of {channel.topic}: {error}") from None
+
+
+def _as_events(dof: int, tables: list[tuple[Kind, Table]]) -> Events:
+    """Return tables as events; a kind has several where a topic has several channels."""
+    parts: dict[Kind, list[Table]] = {}
+    for kind, table in tables:
+        parts.setdefault(kind, []).append(table)
+    joined = {k: tables[0] if len(tables) == 1 else in_order(tables) for k, tables in parts.items()}
+    return Events(dof, dict(sorted(joined.items())))

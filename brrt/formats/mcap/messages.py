@@ -18,13 +18,17 @@ from brrt.events import FIELDS, Events, Kind, Table, table_dtype
 TOPICS = {f"/brrt/{kind.label}": kind for kind in Kind}
 """The topic of each kind of event."""
 
+ENCODINGS = "ros2msg", "cdr"
+"""Encodings of the schemas and of the messages."""
+
 _PRIMITIVES = {
     "bool": "?", "byte": "u1", "char": "u1", "uint8": "u1", "int8": "i1", "uint16": "<u2",
     "int16": "<i2", "uint32": "<u4", "int32": "<i4", "uint64": "<u8", "int64": "<i8",
     "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 _ENCAPSULATION = b"\x00\x01\x00\x00"
-"""How a body begins: CDR version 1, little endian."""
+"""How a body begins: CDR version 1, little endian; then two bytes of options."""
+_LITTLE_ENDIAN = int.from_bytes(_ENCAPSULATION[:2], "little")
 
 _HEAD = [("op", "u1"), ("length", "<u8"), ("channel", "<u2"), ("seq", "<u4"),
          ("log_time", "<u8"), ("publish_time", "<u8")]  # fmt: skip
@@ -81,7 +85,7 @@ class Layout:
         for name, kind in _HEAD:
             begin = sum(np.dtype(before).itemsize for _, before in _HEAD[: len(columns)])
             columns.append((name, kind, begin))
-        columns.append(("encapsulation", "<u4", HEAD_BYTES))
+        columns.append(("encapsulation", "<u2", HEAD_BYTES))
         body = HEAD_BYTES + len(_ENCAPSULATION)
         position, sequence = 0, None
         for line in text.splitlines():
@@ -108,7 +112,7 @@ class Layout:
         records = np.zeros(len(table), self.record)
         records["op"], records["channel"] = MESSAGE, channel_of(kind)
         records["length"] = self.record.itemsize - 9
-        records["encapsulation"] = int.from_bytes(_ENCAPSULATION, "little")
+        records["encapsulation"] = _LITTLE_ENDIAN
         records["seq"] = table["seq"] & 0xFFFFFFFF
         records["log_time"] = table["t"] + epoch_ns
         records["publish_time"] = records["log_time"]
@@ -218,6 +222,7 @@ class Channel:
         window = np.ndarray((places,), f"V{size}", raw, strides=(1,))
         block = window[offsets].view(layout.record)
         right = (block["op"] == MESSAGE) & (block["channel"] == self.number)
+        right &= block["encapsulation"] == _LITTLE_ENDIAN
         if layout.sequence is None:
             right &= block["length"] == size - 9
         if not right.all():

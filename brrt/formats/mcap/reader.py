@@ -4,43 +4,44 @@ A file that was cut or damaged is good up to the first damage: trees and metrics
 need all earlier events.
 """
 
-import json
+import struct
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
-from mcap import records as stock
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
 from brrt.formats.integrity import (
-    MOST_BYTES,
     BrokenError,
     CutError,
     DamagedError,
     ReplacedError,
     parse_head,
 )
-from brrt.formats.mcap.chunks import ChunkDecoder, Index
-from brrt.formats.mcap.messages import TOPICS
+from brrt.formats.mcap.chunks import DECLARATIONS, ChunkDecoder, Index
+from brrt.formats.mcap.compression import unpack_chunk
+from brrt.formats.mcap.ending import parse_result, read_ending
 from brrt.formats.mcap.records import (
     check_summary,
     open_mcap,
-    parse,
     parse_attachment,
     parse_index,
     parse_metadata,
     read_records,
-    read_summary,
-    unpack_chunk,
 )
 from brrt.formats.mcap.sink import RESULT, RUN, WORLD
 from brrt.recording import Recording, Result
 from brrt.scenario.manifest import Manifest
+
+_JOINED, _JOINED_BYTES = -1, 1 << 20
+"""In place of an opcode: records outside of chunks, joined as in a chunk of so many bytes."""
 
 
 def read_mcap(path: Path) -> Recording:
@@ -53,21 +54,23 @@ def read_mcap(path: Path) -> Recording:
         RecordingError: The file cannot be read, or is not a recording of brrt.
     """
     texts: Mapping[str, str] | None = None
+    world_json: bytes | None = None
     try:
         with open_mcap(path) as file:
             for opcode, data in read_records(path, file):
                 if opcode == Opcode.METADATA:
                     metadata = parse_metadata(data)
                     texts = metadata.metadata if metadata.name == RUN else texts
-                elif opcode == Opcode.ATTACHMENT and texts is not None:
+                elif opcode == Opcode.ATTACHMENT:
                     attachment = parse_attachment(data)
-                    if attachment.name == WORLD:
-                        manifest, world = parse_head(path, texts, attachment.data)
-                        batches = partial(_batches, path, manifest, texts)
-                        end = _ending(path)
-                        return Recording(manifest, world, batches, end.result, end.counts)
-                elif opcode in (Opcode.CHUNK, Opcode.DATA_END):
+                    world_json = attachment.data if attachment.name == WORLD else world_json
+                elif opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.DATA_END):
                     break
+                if texts is not None and world_json is not None:
+                    manifest, world = parse_head(path, texts, world_json)
+                    batches = partial(_batches, path, manifest, texts)
+                    end = read_ending(path)
+                    return Recording(manifest, world, batches, end.result, end.counts or None)
     except CutError as error:
         raise error.before_events() from None
     except RecordingError:
@@ -76,7 +79,7 @@ def read_mcap(path: Path) -> Recording:
         raise DamagedError(path, f"damaged: {error}") from None
     raise RecordingError(
         f"{path}: an MCAP file, but not a recording of brrt, or one that another tool rewrote: "
-        f"metadata {RUN} and then attachment {WORLD} must precede the first chunk; "
+        f"metadata {RUN} and attachment {WORLD} must precede the first message; "
         "read the file that it was made of, or have the tool write them first"
     )
 
@@ -91,59 +94,6 @@ def is_whole(path: Path) -> bool:
     except BrrtError:
         return False
     return True
-
-
-class _Ending(NamedTuple):
-    """What the summary says of the run.
-
-    Attributes:
-        result: The metrics; None if they are not there, or damaged.
-        counts: Events of each kind; None if they are not there.
-        ended: Whether there is a result, so that the run came to its own end.
-    """
-
-    result: Result | None = None
-    counts: Mapping[Kind, int] | None = None
-    ended: bool = False
-
-
-def _ending(path: Path) -> _Ending:
-    """Read the result and the counts from the end of a file; of a cut file there are none."""
-    counts, kinds, place = None, dict[int, Kind](), None
-    try:
-        with path.open("rb") as file:
-            for opcode, data in read_summary(path, file):
-                if opcode == Opcode.CHANNEL:
-                    channel = parse(stock.Channel, data)
-                    if channel.topic in TOPICS:
-                        kinds[channel.id] = TOPICS[channel.topic]
-                elif opcode == Opcode.STATISTICS:
-                    stated = parse(stock.Statistics, data).channel_message_counts
-                    counts = {kind: int(stated.get(number, 0)) for number, kind in kinds.items()}
-                elif opcode == Opcode.METADATA_INDEX:
-                    index = parse(stock.MetadataIndex, data)
-                    place = index if index.name == RESULT else place
-            return _Ending(_result_at(file, place), counts, ended=place is not None)
-    except (OSError, OverflowError, BrrtError):
-        return _Ending()
-
-
-def _result_at(file: IO[bytes], place: stock.MetadataIndex | None) -> Result | None:
-    """Read the result where the summary says that it is; None if it is not there, or damaged."""
-    if place is None or place.length > MOST_BYTES:
-        return None
-    file.seek(place.offset)
-    try:
-        return _parse_result(parse_metadata(file.read(place.length)[9:]))
-    except BrrtError:
-        return None
-
-
-def _parse_result(metadata: stock.Metadata) -> Result:
-    try:
-        return {name: json.loads(text) for name, text in metadata.metadata.items()}
-    except (ValueError, RecursionError):
-        raise BrrtError(f"{metadata.name} is not JSON") from None
 
 
 def _batches(path: Path, manifest: Manifest, texts: Mapping[str, str]) -> Iterator[Events]:
@@ -181,6 +131,7 @@ class _Reader:
         self._decoder = ChunkDecoder(manifest.dof, manifest.epoch_ns)
         self._same = self._at_end = False
         self._result: Result | None = None
+        self._counts = Counter[Kind]()
 
     def batches(self, file: IO[bytes]) -> Iterator[Events]:
         """Yield the events of each chunk.
@@ -188,28 +139,59 @@ class _Reader:
         Raises:
             BrrtError: The file is cut, damaged, or another one than when it was opened.
         """
-        for opcode, data, index in _with_indexes(read_records(self._path, file)):
-            if opcode == Opcode.CHUNK:
-                self._check_same()
-                events = self._decoder.events(unpack_chunk(data), index)
-                if len(events):
-                    yield events
-            elif opcode == Opcode.MESSAGE:
-                raise BrrtError("a message outside of a chunk, as brrt writes none")
-            elif opcode == Opcode.METADATA:
-                metadata = parse_metadata(data)
-                if metadata.name == RESULT:
-                    self._result = _parse_result(metadata)
-                elif metadata.name == RUN:
-                    self._same = self._same or metadata.metadata == self._texts
-                    self._check_same()
+        try:
+            yield from self._data(file)
+        except BrrtError:
+            with suppress(BrrtError):
+                yield from self._counted(self._decoder.rest())
+            raise
         self._check_same()
         self._at_end = True
         check_summary(self._path, file)
-        stated, count = self._stated(), self.count
+        self._check_counts()
+
+    def _data(self, file: IO[bytes]) -> Iterator[Events]:
+        """Yield the events of the data section."""
+        for opcode, data, index in _with_indexes(_joined(read_records(self._path, file))):
+            if opcode == Opcode.CHUNK:
+                self._check_same()
+                yield from self._counted(self._decoder.events(unpack_chunk(data), index, len(data)))
+            elif opcode == _JOINED:
+                yield from self._counted(self._decoder.events(data, index, len(data)))
+            elif opcode == Opcode.METADATA:
+                metadata = parse_metadata(data)
+                if metadata.name == RESULT:
+                    self._result = parse_result(metadata)
+                elif metadata.name == RUN:
+                    self._same = self._same or metadata.metadata == self._texts
+                    self._check_same()
+        self._decoder.check_complete()
+
+    def _counted(self, events: Events) -> Iterator[Events]:
+        """Yield a batch, unless it is empty."""
+        if len(events):
+            self._check_same()
+            self._counts.update(events.counts)
+            yield events
+
+    def _check_counts(self) -> None:
+        """Check that as many events were read as the result and the statistics say.
+
+        Raises:
+            DamagedError: They say otherwise.
+        """
+        end, count = read_ending(self._path), self.count
+        stated = self._stated()
         if stated not in (None, count):
-            why = f"damaged: {stated} events were written, {count} are there"
-            raise DamagedError(self._path, why)
+            raise DamagedError(self._path, f"damaged: {_differ(stated, count, 'events')}")
+        for kind, number in end.counts_of(self._decoder.kinds).items():
+            if number != self._counts[kind]:
+                why = _differ(number, self._counts[kind], f"events of kind {kind.label}")
+                raise DamagedError(self._path, f"damaged: by its statistics, {why}")
+        messages = count + self._decoder.foreign
+        if end.statistics is not None and end.statistics.message_count != messages:
+            why = _differ(end.statistics.message_count, messages, "messages")
+            raise DamagedError(self._path, f"damaged: by its statistics, {why}")
 
     @property
     def count(self) -> int:
@@ -218,10 +200,10 @@ class _Reader:
 
     def judged(self, error: BrokenError) -> BrokenError:
         """Return the error with whether all events were read, and whether the run had ended."""
-        end = _ending(self._path)
+        end = read_ending(self._path)
         stated = self._stated()
-        if stated is None and end.counts is not None:
-            stated = sum(end.counts.values())
+        if stated is None:
+            stated = sum(end.counts_of(self._decoder.kinds).values()) or None
         complete = self._at_end if stated is None else stated == self.count
         return error.judged(complete=complete, ended=end.ended or self._result is not None)
 
@@ -232,6 +214,30 @@ class _Reader:
     def _check_same(self) -> None:
         if not self._same:
             raise ReplacedError(self._path)
+
+
+def _differ(stated: Any, there: int, what: str) -> str:
+    return f"{stated} {what} were written, {there} are there"
+
+
+def _joined(records: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes]]:
+    """Yield records; messages and declarations outside of chunks are joined as `_JOINED`."""
+    parts, size = list[bytes](), 0
+    try:
+        for opcode, data in records:
+            loose = opcode == Opcode.MESSAGE or opcode in DECLARATIONS
+            if loose:
+                parts += struct.pack("<BQ", opcode, len(data)), data
+                size += len(data)
+            if parts and (not loose or size > _JOINED_BYTES):
+                yield _JOINED, b"".join(parts)
+                parts, size = [], 0
+            if not loose:
+                yield opcode, data
+    except BrrtError:
+        if parts:
+            yield _JOINED, b"".join(parts)
+        raise
 
 
 def _with_indexes(records: Iterable[tuple[int, bytes]]) -> Iterator[tuple[int, bytes, Index]]:

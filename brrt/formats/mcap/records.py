@@ -5,12 +5,11 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from io import BytesIO
-from os import SEEK_END
+from os import SEEK_CUR, SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -28,8 +27,6 @@ CHECKSUM = "crc32"
 _BLOCK = 1 << 20
 _MOST_BETWEEN = 1 << 17
 """Records between two chunks: there are 65,536 channels, and each may have an index."""
-_ANY, _TIMES = 1 << 20, 256
-"""Bytes that a chunk may unpack to: in any case, and times its size. Events come to 15 times."""
 
 
 def open_mcap(path: Path) -> IO[bytes]:
@@ -64,7 +61,7 @@ def read_records(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     while True:
         head, data = _next_record(path, file)
         opcode = head[0]
-        between = 0 if opcode == Opcode.CHUNK else between + 1
+        between = 0 if opcode in (Opcode.CHUNK, Opcode.MESSAGE) else between + 1
         if between > _MOST_BETWEEN:
             why = f"damaged near byte {file.tell():,}: {between:,} records without an event"
             raise DamagedError(path, why)
@@ -148,8 +145,11 @@ def parse_attachment(data: bytes) -> records.Attachment:
         BrrtError: It is damaged.
     """
     attachment: records.Attachment = parse(records.Attachment, data)
-    stated = struct.unpack("<I", data[-4:])[0]
-    if stated not in (0, zlib.crc32(data[:-4])):  # 0 stands for no checksum
+    # Two times, two texts and the data with their lengths; later versions may add fields.
+    texts = attachment.name.encode() + attachment.media_type.encode()
+    end = 32 + len(texts) + len(attachment.data)
+    stated = struct.unpack_from("<I", data, end)[0]
+    if stated not in (0, zlib.crc32(data[:end])):  # 0 stands for no checksum
         raise BrrtError(f"the checksum of {attachment.name} does not match")
     return attachment
 
@@ -163,32 +163,8 @@ def parse_index(data: bytes) -> dict[int, NDArray[np.uint64]]:
     return {}
 
 
-def unpack_chunk(data: bytes) -> bytes:
-    """Return the records in a chunk.
-
-    Raises:
-        BrrtError: The chunk is damaged.
-    """
-    chunk = parse(records.Chunk, data)
-    raw, size = chunk.data, chunk.uncompressed_size
-    if chunk.compression not in ("", "zstd"):
-        raise BrrtError(f"a chunk has the compression {chunk.compression!r:.40}, brrt reads zstd")
-    if chunk.compression:
-        if size > min(MOST_BYTES, _ANY + _TIMES * len(raw)):
-            raise BrrtError(f"a chunk says that it unpacks to {size:,} bytes")
-        try:
-            if zstandard.frame_content_size(raw) != size:
-                raise BrrtError("a chunk has a wrong size")
-            raw = zstandard.ZstdDecompressor().decompress(raw)
-        except zstandard.ZstdError as error:
-            raise BrrtError(f"a chunk cannot be unpacked ({error})") from None
-    if len(raw) != size or zlib.crc32(raw) != chunk.uncompressed_crc:
-        raise BrrtError("the checksum of a chunk does not match")
-    return bytes(raw)
-
-
-def check_summary(path: Path, file: IO[bytes]) -> None:
-    """Check that what follows the data section is whole: summary, footer, magic.
+def check_summary(path: Path, file: IO[bytes]) -> bytes:
+    """Check that what follows the data section is whole, and return it: summary, footer, magic.
 
     Raises:
         CutError: It is not all there.
@@ -199,24 +175,57 @@ def check_summary(path: Path, file: IO[bytes]) -> None:
         raise CutError(path, f"the file is cut at byte {file.tell():,}, after the last event")
     # All but the checksum itself, which is the footer's last field.
     body, crc = rest[: -len(MAGIC) - 4], rest[-len(MAGIC) - 4 : -len(MAGIC)]
-    if zlib.crc32(body) != struct.unpack("<I", crc)[0]:
+    if struct.unpack("<I", crc)[0] not in (0, zlib.crc32(body)):  # 0 stands for no checksum
         raise DamagedError(path, "damaged: the checksum of the summary does not match")
+    return rest
 
 
 def read_summary(path: Path, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and content of each record of the summary.
+    """Yield opcode and content of each record of the summary; none if there is no summary.
 
     Raises:
         OSError: The file is too short, or cannot be read.
-        BrrtError: The summary is not there or damaged.
+        BrrtError: The end of the file is not there or damaged.
     """
     size = file.seek(-FOOTER_BYTES - len(MAGIC), SEEK_END)
-    start = parse(records.Footer, file.read(FOOTER_BYTES)[9:]).summary_start
-    if 0 < size - start <= MOST_BYTES:
-        file.seek(start)
-        check_summary(path, file)
-        file.seek(start)
-        for opcode, data in read_records(path, file):
-            if opcode == Opcode.FOOTER:
-                return
-            yield opcode, data
+    start = parse(records.Footer, file.read(FOOTER_BYTES)[9:]).summary_start or size
+    if not 0 <= size - start <= MOST_BYTES:
+        raise BrrtError("the summary is not where the footer says")
+    file.seek(start)
+    yield from _records_in(check_summary(path, file)[: size - start])
+
+
+def _records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and content of each record in bytes.
+
+    Raises:
+        BrrtError: A record reaches beyond their end.
+    """
+    at = 0
+    while at < len(data):
+        head = data[at : at + 9].ljust(9, b"\xff")
+        opcode, length = struct.unpack("<BQ", head)
+        end = at + 9 + length
+        if end > len(data):
+            raise BrrtError("a record reaches out of the summary")
+        yield opcode, data[at + 9 : end]
+        at = end
+
+
+def find_metadata(file: IO[bytes], name: str) -> records.Metadata | None:
+    """Return the last metadata of a name, for files without an index; None if there is none.
+
+    Raises:
+        BrrtError: The data section is damaged.
+    """
+    found, between = None, 0
+    file.seek(len(MAGIC))
+    while len(head := file.read(9)) == 9 and head[0] != Opcode.DATA_END and between < _MOST_BETWEEN:
+        between = 0 if head[0] in (Opcode.CHUNK, Opcode.MESSAGE) else between + 1
+        length = struct.unpack_from("<Q", head, 1)[0]
+        if head[0] == Opcode.METADATA and length <= MOST_BYTES:
+            metadata = parse_metadata(_up_to(file, length))
+            found = metadata if metadata.name == name else found
+        else:
+            file.seek(length, SEEK_CUR)
+    return found

@@ -15,7 +15,7 @@ from brrt.errors import WriteError
 from brrt.events import Events, Kind
 from brrt.formats.batching import Batching
 from brrt.formats.mcap.container import Container
-from brrt.formats.mcap.messages import TOPICS, Layout, channel_of, definition, encode
+from brrt.formats.mcap.messages import ENCODINGS, TOPICS, Layout, channel_of, definition, encode
 from brrt.formats.mcap.records import with_checksum
 from brrt.recording import Result
 from brrt.scenario.manifest import Manifest
@@ -108,8 +108,9 @@ class McapSink:
 
 
 def _declarations(definitions: Mapping[Kind, str]) -> Iterator[records.Schema | records.Channel]:
+    of_schemas, of_messages = ENCODINGS
     for kind, text in definitions.items():
         name = f"brrt_msgs/msg/{kind.label.capitalize()}"
-        yield records.Schema(channel_of(kind), text.encode(), "ros2msg", name)
+        yield records.Schema(channel_of(kind), text.encode(), of_schemas, name)
     for topic, kind in TOPICS.items():
-        yield records.Channel(channel_of(kind), topic, "cdr", {}, channel_of(kind))
+        yield records.Channel(channel_of(kind), topic, of_messages, {}, channel_of(kind))

@@ -8,18 +8,17 @@ as that shows, and the `.mcap` of the run, which is written beside it, is what r
 import json
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from os import SEEK_END
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rerun.chunk import LazyStore, RrdReader
 
 from brrt.errors import BrrtError, RecordingError
-from brrt.events import Events, Kind, Table
+from brrt.events import Events, Kind
 from brrt.formats.integrity import Numbering, ReplacedError, parse_head
+from brrt.formats.ordering import Waiting
 from brrt.formats.rrd.columns import END, EVENTS, MANIFEST, WORLD, archetype, table_of
 from brrt.recording import Recording
 from brrt.scenario.manifest import Manifest
@@ -157,7 +156,7 @@ def _batches(
     store = _open(path)
     if _texts(path, store).get(MANIFEST) != head:
         raise ReplacedError(path)
-    waiting, numbering, unpacked = _Waiting(manifest.dof), Numbering(), 0
+    waiting, numbering, unpacked = Waiting(manifest.dof), Numbering(), 0
     most = _ANY + _TIMES * path.stat().st_size
     try:
         for chunk in store.stream().filter(content=[f"{EVENTS}**"]):
@@ -170,8 +169,9 @@ def _batches(
                 raise BrrtError("it unpacks to more than any real file")  # noqa: TRY301
             batch.validate(full=True)
             waiting.add(kind, table_of(kind, manifest.dof, batch))
-            if waiting.last + 1 == numbering.next + waiting.count:
-                events = waiting.take()
+            if waiting.complete(numbering.next):
+                events = waiting.events()
+                waiting.clear()
                 numbering.take(events)
                 yield from _sliced(events)
         if waiting.count or numbering.next != count:
@@ -179,32 +179,6 @@ def _batches(
             raise BrrtError(f"{count:,} events were written, {there:,} are there")  # noqa: TRY301
     except Exception as error:  # noqa: BLE001 - whatever damage leads Rerun and pyarrow to
         raise _damaged(path, error) from None
-
-
-@dataclass(slots=True)
-class _Waiting:
-    """Events that wait for earlier ones: each kind comes in chunks of its own."""
-
-    dof: int
-    tables: dict[Kind, list[Table]] = field(default_factory=dict)
-    count: int = 0
-    last: int = -1
-
-    def add(self, kind: Kind, table: Table) -> None:
-        self.tables.setdefault(kind, []).append(table)
-        self.count += len(table)
-        self.last = max(self.last, int(table["seq"].max(initial=-1)))
-
-    def take(self) -> Events:
-        """Return all events, in order."""
-        tables: dict[Kind, Any] = {}
-        for kind, parts in sorted(self.tables.items()):
-            table = parts[0] if len(parts) == 1 else np.concatenate(parts)
-            if (np.diff(table["seq"]) < 0).any():
-                table = table[np.argsort(table["seq"], kind="stable")]
-            tables[kind] = table
-        self.tables, self.count = {}, 0
-        return Events(self.dof, tables)
 
 
 def _sliced(events: Events) -> Iterator[Events]:
