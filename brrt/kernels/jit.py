@@ -13,6 +13,8 @@ from numba.core import config as _config
 from numba.core import event
 from platformdirs import user_cache_path
 
+from brrt.kernels.cache import KernelCache
+
 config: Any = _config
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -36,7 +38,7 @@ def _sources_digest() -> str:
 
 
 def _cache_folder() -> Path | None:
-    """Make the folder for compiled code; None if it cannot be written."""
+    """Make the folder for compiled code; None if there is none."""
     root = os.environ.get("BRRT_CACHE_DIR")
     folder = Path(root) if root else user_cache_path("brrt", appauthor=False)
     folder = folder / "kernels" / _sources_digest()
@@ -44,7 +46,7 @@ def _cache_folder() -> Path | None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return None
-    return folder if os.access(folder, os.W_OK) else None
+    return folder
 
 
 CACHE_FOLDER = _cache_folder()
@@ -118,15 +120,11 @@ INLINE_HELPER: dict[str, Any] = {**HELPER, "forceinline": True}
 
 
 def _compiled(fn: F, options: dict[str, Any]) -> F:
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(CACHE_FOLDER or "")
-    try:
-        both = {"cache": CACHE_FOLDER is not None, "nogil": True, "error_model": "numpy", **options}
-        dispatcher = numba.njit(**both)(fn)
-    finally:
-        config.CACHE_DIR = before
     if config.DISABLE_JIT:
         return fn
+    dispatcher: Any = numba.njit(**{"nogil": True, "error_model": "numpy", **options})(fn)
+    if CACHE_FOLDER is not None:
+        _cache(dispatcher, CACHE_FOLDER)
     resolve = dispatcher.get_call_template
     dispatcher.get_call_template = lambda args, kws: resolve(
         tuple(map(_plain, args)), {k: _plain(v) for k, v in kws.items()}
@@ -134,6 +132,15 @@ def _compiled(fn: F, options: dict[str, Any]) -> F:
     if options.get("no_cpython_wrapper"):
         _refuse_python(dispatcher)
     return cast("F", dispatcher)
+
+
+def _cache(dispatcher: Any, folder: Path) -> None:
+    """Let numba load and save compiled code in a folder."""
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        dispatcher._cache = KernelCache(dispatcher.py_func)  # noqa: SLF001 - what `cache=True` sets
+    finally:
+        config.CACHE_DIR = before
 
 
 def _plain(argument: Any) -> Any:

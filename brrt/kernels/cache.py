@@ -1,0 +1,107 @@
+"""The cache of compiled kernels on disk: numba's, but any failure means compiling anew."""
+
+import pickle
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    UserProvidedCacheLocator,
+)
+
+_CHECKSUM_BYTES = 4
+
+_notify: Callable[[str], None] | None = None
+
+
+def on_unsaved(notify: Callable[[str], None]) -> None:
+    """Call `notify` with the reason, once, when compiled code cannot be written to the cache."""
+    global _notify  # noqa: PLW0603 - one cache, one listener
+    _notify = notify
+
+
+class _Locator(UserProvidedCacheLocator):
+    """The folder `numba.config.CACHE_DIR`, which need not be there before something is saved."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        return cls(py_func, py_file)
+
+
+class _Implementation(CompileResultCacheImpl):
+    _locator_classes = (_Locator,)
+
+
+class KernelCache(FunctionCache):
+    """The compiled versions of one function.
+
+    Numba raises whatever opening, reading or unpickling a damaged file raises, and what writing to
+    a full disk does.
+    """
+
+    _impl_class = _Implementation
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._cache_file = _Files(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=self._impl.locator.get_source_stamp(),
+        )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function for a signature; None if it is not in the cache."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # noqa: BLE001 - unpickling raises nearly anything
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save a compiled function if that is possible."""
+        global _notify  # noqa: PLW0603
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:  # noqa: BLE001 - the function is compiled, saved or not
+            notify, _notify = _notify, None
+            if notify is not None:
+                reason = getattr(error, "strerror", None) or error
+                notify(f"{Path(self._cache_path).parent}: {reason}")
+
+
+class _Files(IndexDataCacheFile):
+    """The files of one function, with a checksum, and with the key that their code is for.
+
+    A file of the right length may hold wrong bytes, zeros after a power cut, which the linker would
+    crash on. Of two processes that save at once, one may overwrite what the other's index names.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        super().save(key, (self._label(key), data))
+
+    def load(self, key: Any) -> Any:
+        loaded = super().load(key)
+        return loaded[1] if loaded and loaded[0] == self._label(key) else None
+
+    def _label(self, key: Any) -> tuple[Any, ...]:
+        return (self._index_name, self._source_stamp, key)
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:  # noqa: BLE001 - see KernelCache; the next save writes a new one
+            return {}
+
+    def _dump(self, obj: Any) -> bytes:
+        data = super()._dump(obj)  # unpickling ignores what follows
+        return bytes(data + zlib.crc32(data).to_bytes(_CHECKSUM_BYTES, "little"))
+
+    def _load_data(self, name: str) -> Any:
+        data = Path(self._data_path(name)).read_bytes()
+        end = len(data) - _CHECKSUM_BYTES
+        if zlib.crc32(memoryview(data)[:end]).to_bytes(_CHECKSUM_BYTES, "little") != data[end:]:
+            return None
+        return pickle.loads(data)  # noqa: S301 - as numba does, from the user's own folder
