@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from brrt.errors import BrrtError
@@ -24,6 +25,8 @@ MOST_JSON_LISTS = 5_000_000
 
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n?|\n|\Z)")
 
+_LONE_SURROGATE = re.compile("[\ud800-\udfff]")
+
 _SYNC_S = 1.0
 _CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
 """fsync fails with these on pipes and devices, which have no disk behind them."""
@@ -37,6 +40,31 @@ def is_there(path: Path | str) -> bool:
 def is_file(path: Path | str) -> bool:
     """Whether a path is a file; False where pathlib raises, as for a name that is too long."""
     return os.path.isfile(path)  # noqa: PTH113
+
+
+def readable(text: object) -> str:
+    r"""Return a text that UTF-8 can write: a byte of a file's name that is no text becomes \xff.
+
+    Names of files are bytes. Python keeps those that are not UTF-8 as lone surrogates, which
+    neither files nor terminals take.
+    """
+    return _LONE_SURROGATE.sub(lambda found: _escape(ord(found[0])), str(text))
+
+
+def _escape(code: int) -> str:
+    return f"\\x{code - 0xDC00:02x}" if 0xDC80 <= code <= 0xDCFF else f"\\u{code:04x}"
+
+
+@contextmanager
+def readable_name(path: Path) -> Iterator[Path]:
+    """Yield a name of a file that is UTF-8: its own, or that of a temporary link to it."""
+    if readable(path) == str(path):
+        yield path
+        return
+    with TemporaryDirectory(prefix="brrt-") as folder:
+        link = Path(folder) / f"run{path.suffix}"
+        link.symlink_to(path.absolute())
+        yield link
 
 
 def read_bytes(path: Path, what: str, most_bytes: int, *, rest: bool = True) -> bytes:

@@ -3,13 +3,15 @@
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
+from traceback import print_exception
 from typing import Any
 
 import typer
 from typer.main import get_command
 
 from .command import Command, Group
-from .console import Code, complain
+from .console import SIGNALLED, Code, complain
+from .streams import output_error, robust_streams
 
 _COMMANDS = {
     "plan": "plan",
@@ -53,6 +55,13 @@ class _Brrt(Group):
         super().__init__(*args, **given)
         self.commands: Any = _Commands()
 
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; typer would take an EOFError for Ctrl-D at a prompt, of which none is."""
+        try:
+            return super().invoke(ctx)
+        except EOFError as error:
+            raise RuntimeError(f"a file ends too early: {error}") from error
+
 
 app = typer.Typer(
     name="brrt",
@@ -80,8 +89,8 @@ def options(
       [bold]brrt view run.rrd[/bold]      watch the trees grow
 
     Exit codes: 0 solved, equal, verified; 1 no path, different, a rule is broken;
-    2 bad input; 130 Ctrl-C, 143 SIGTERM, 129 terminal closed. After a signal the files
-    are complete up to that moment.
+    2 bad input, or output that cannot be written; 130 Ctrl-C, 143 SIGTERM, 129 terminal
+    closed. After a signal the files are complete up to that moment.
     """
     if version:
         from importlib.metadata import version as version_of
@@ -92,7 +101,16 @@ def options(
 
 def main(args: Sequence[str] | None = None) -> None:
     """Run the command line; bad input is one line on stderr and exit code 2."""
-    sys.exit(_run(args))
+    with robust_streams():
+        try:
+            code = _run(args)
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        error = output_error()
+        if error is not None:
+            complain(f"cannot write: {error.strerror}")
+            code = code if code > SIGNALLED else Code.BAD_INPUT
+    sys.exit(code)
 
 
 def _run(args: Sequence[str] | None) -> int:
@@ -100,19 +118,17 @@ def _run(args: Sequence[str] | None) -> int:
         return int(app(args, prog_name="brrt", standalone_mode=False) or 0)
     except (typer.Abort, KeyboardInterrupt):
         return Code.INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output has closed it: there is nothing more to print.
-        sys.stdout = None
-        return Code.FAILED
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - reported
         # Wrong usage: typer brings its own copy of click, whose classes have no public name.
         usage = getattr(error, "format_message", None)
         if usage is not None:
-            complain(f"{usage()} (see brrt --help)")
+            if usage():  # empty where the help is printed instead of a command
+                complain(f"{usage()} (see brrt --help)")
             return Code.BAD_INPUT
         from brrt.errors import BrrtError
 
-        if not isinstance(error, BrrtError):
-            raise
-        complain(str(error))
+        if isinstance(error, BrrtError | OSError):
+            complain(str(error))
+        else:
+            print_exception(error)  # Python would end with code 1, which says "no path"
     return Code.BAD_INPUT

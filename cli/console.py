@@ -7,6 +7,8 @@ from enum import IntEnum
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from .streams import output_ended
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -47,7 +49,8 @@ def _print_on_stderr(text: str, style: str) -> None:
 
 
 def announce_compilation() -> None:
-    """Print a note if kernels are compiled, which takes seconds."""
+    """Print a note if kernels are compiled, which takes seconds, and if they cannot be kept."""
+    from brrt.kernels.cache import on_unsaved
     from brrt.kernels.jit import CACHE_FOLDER, on_compiling
 
     if CACHE_FOLDER is None:
@@ -58,6 +61,12 @@ def announce_compilation() -> None:
         return
     text = "compiling the planner for this robot, once on this machine (10 to 20 s)"
     on_compiling(lambda: note(text))
+    on_unsaved(
+        lambda reason: note(
+            f"cannot keep the compiled planner in {reason}; it is compiled again in each run, "
+            "unless the variable BRRT_CACHE_DIR names another folder"
+        )
+    )
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -73,6 +82,8 @@ def print_line(text: str = "", style: str = "") -> None:
 def print_lines(lines: Iterable[str]) -> None:
     """Print lines on stdout as they are, however wide the terminal."""
     for line in lines:
+        if output_ended():
+            return
         print_line(line)
 
 

@@ -1,8 +1,6 @@
 """`brrt plan`: run a planner and record it."""
 
 import shlex
-import signal
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -180,7 +178,7 @@ def plan(
         else:
             run = _branched_run(parent, limits, settings, params)
         metrics = _execute(run, _sinks(run, mcap, rrd, view=view), bar)
-    _report(run, metrics.as_dict(), mcap, rrd, as_json=as_json)
+    _report(metrics.as_dict(), mcap, rrd, as_json=as_json)
     if run.stop.interrupted:
         raise typer.Exit(SIGNALLED + run.stop.signal)
     if not metrics.solved:
@@ -329,25 +327,16 @@ def _execute(run: "Run", sinks: list["Sink"], bar: ProgressBar) -> "Metrics":
 
 
 def _report(
-    run: "Run", metrics: Mapping[str, Any], mcap: Path | None, rrd: Path | None, *, as_json: bool
+    metrics: Mapping[str, Any], mcap: Path | None, rrd: Path | None, *, as_json: bool
 ) -> None:
     """Print the metrics, and the commands to open the files with."""
-    try:
-        if as_json:
-            print_json(metrics)
-        else:
-            _print_summary(metrics, mcap, rrd)
-    except OSError:
-        if run.stop.signal != signal.SIGHUP:
-            raise
-        sys.stdout = None  # the terminal was closed
-
-
-def _print_summary(metrics: Mapping[str, Any], mcap: Path | None, rrd: Path | None) -> None:
     from rich.markup import escape
 
     from .summary import print_summary
 
+    if as_json:
+        print_json(metrics)
+        return
     print_summary(metrics)
     shown = rrd or mcap  # brrt view opens the one faster that holds a drawing
     ways = [(mcap, "look inside", "replay"), (shown, "watch it", "view")]

@@ -3,7 +3,7 @@
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any
 
 from .console import console
@@ -19,7 +19,7 @@ class ProgressBar:
 
     def __init__(self, total: float | None, waiting: str) -> None:
         self.total = total
-        self._bar: Any = _bar() if sys.stderr is not None and sys.stderr.isatty() else None
+        self._bar: Any = _bar() if sys.stderr.isatty() else None
         if self._bar is not None:
             self._task = self._bar.add_task(waiting, total=None, figures="")
 
@@ -37,8 +37,7 @@ class ProgressBar:
         finally:
             timer.cancel()
             if self._bar.live.is_started:
-                with suppress(OSError):  # the terminal may have been closed
-                    self._bar.stop()
+                self._bar.stop()
 
     def update(self, done: float, what: str, figures: str) -> None:
         """Show how far the job is."""
@@ -51,12 +50,13 @@ class ProgressBar:
 def _bar() -> Any:
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    shown = console(stderr=True)
     return Progress(
-        SpinnerColumn(),
+        SpinnerColumn("dots" if shown.encoding.startswith("utf") else "line"),
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.fields[figures]}"),
         TimeElapsedColumn(),
-        console=console(stderr=True),
+        console=shown,
         transient=True,
     )

@@ -151,7 +151,7 @@ def _draw(
     from brrt.views.viewer.control import Cursor
 
     cursors = [Cursor(_TIMELINES[name], value) for name, value in limits.items()]
-    cursor, file = cursors[0] if cursors else None, folder / f"{runs[0].stem}.rrd"
+    cursor, file = cursors[0] if cursors else None, folder / f"{_stem(runs[0])}.rrd"
     if len(runs) == 2:
         watch.update(0, "drawing both runs", "")
         difference = draw_pair(file, *recordings)
@@ -162,7 +162,10 @@ def _draw(
         return file, cursor
     ring = limits.get("seq")
     if runs[0].suffix == ".rrd" and ring is None and recordings[0].result is not None:
-        return runs[0], cursor
+        if file.stem == runs[0].stem:
+            return runs[0], cursor
+        file.symlink_to(runs[0].absolute())
+        return file, cursor
     watch.total = total = sum(map(len, recordings[0].batches()))
     draw_run(
         file,
@@ -171,6 +174,13 @@ def _draw(
         progress=lambda done: watch.update(done, "drawing", f"{done:,} of {total:,} events"),
     )
     return file, cursor
+
+
+def _stem(run: Path) -> str:
+    """Return a file's name without its ending, as the viewer can read it."""
+    from brrt.files import readable
+
+    return readable(run.stem).replace("\\", "_") if readable(run) != str(run) else run.stem
 
 
 def _load(run: Path) -> "Recording":

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from brrt.errors import BrrtError, WriteError
-from brrt.files import replacing
+from brrt.files import readable, replacing
 from brrt.formats import read
 from brrt.formats.integrity import BrokenError
 from brrt.formats.mcap.sink import McapSink
@@ -99,8 +99,8 @@ def _copy(recording: Recording, sink: Any, metrics: Metrics) -> Recovery:
 
 def _note(cut: Path, recovery: Recovery) -> dict[str, str]:
     return {
-        "from": cut.name,
+        "from": readable(cut.name),
         "events": str(recovery.events),
         "until_s": f"{recovery.until_s:.9f}",
-        "lost": (recovery.lost or "").replace(str(cut), cut.name),
+        "lost": readable((recovery.lost or "").replace(str(cut), cut.name)),
     }

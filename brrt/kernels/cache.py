@@ -1,5 +1,7 @@
 """The cache of compiled kernels on disk: numba's, but any failure means compiling anew."""
 
+# mypy: disable-error-code="no-untyped-call"
+
 import pickle
 import zlib
 from collections.abc import Callable
@@ -33,7 +35,7 @@ class _Locator(UserProvidedCacheLocator):
 
 
 class _Implementation(CompileResultCacheImpl):
-    _locator_classes = (_Locator,)
+    _locator_classes: list[type[object]] = [_Locator]  # noqa: RUF012 - numba declares it so
 
 
 class KernelCache(FunctionCache):
@@ -62,7 +64,7 @@ class KernelCache(FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a compiled function if that is possible."""
-        global _notify  # noqa: PLW0603
+        global _notify
         try:
             super().save_overload(sig, data)
         except Exception as error:  # noqa: BLE001 - the function is compiled, saved or not

@@ -84,7 +84,7 @@ def _headline(found: Comparison) -> str:
 def _fail(kept: Path, message: str) -> NoReturn:
     """Fail the test, and write the message beside what is kept of the run."""
     __tracebackhide__ = True
-    kept.with_suffix(".txt").write_text(message + "\n", "utf-8")
+    kept.with_suffix(".txt").write_text(message + "\n", "utf-8", "backslashreplace")
     pytest.fail(message, pytrace=False)
 
 

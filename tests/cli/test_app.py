@@ -85,6 +85,35 @@ def test_wrong_usage_is_one_line(args: list[str], message: str, brrt: Command) -
     assert done.err.endswith("(see brrt --help)\n")
 
 
+def test_without_a_command(brrt: Command) -> None:
+    """The help is printed, and nothing is said on stderr."""
+    done = brrt()
+    assert (done.code, done.err) == (2, "")
+    assert "Usage: brrt" in done.out
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (EOFError("Ran out of input"), "a file ends too early: Ran out of input"),
+        (OSError(28, "No space left on device"), "No space left on device"),
+        (RuntimeError("a bug"), "a bug"),
+    ],
+)
+def test_unexpected_errors(
+    error: Exception, message: str, brrt: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They end neither as Ctrl-C, as which typer takes an EOFError, nor as "no path"."""
+
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("brrt.planners.rrt.RRT.describe", fail)
+    done = brrt("planners")
+    assert done.code == 2
+    assert message in done.err.splitlines()[-1]
+
+
 def test_help_is_fast() -> None:
     """The list of commands imports none of the heavy packages, nor do their help pages."""
     heavy = {"mcap", "numba", "numpy", "pyarrow", "rerun"}

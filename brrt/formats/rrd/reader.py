@@ -17,6 +17,7 @@ from rerun.chunk import LazyStore, RrdReader
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
+from brrt.files import readable_name
 from brrt.formats.integrity import Numbering, ReplacedError, parse_head
 from brrt.formats.ordering import Waiting
 from brrt.formats.rrd.columns import END, EVENTS, MANIFEST, WORLD, archetype, table_of
@@ -86,10 +87,11 @@ def _open(path: Path) -> LazyStore:
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     try:
-        reader = RrdReader(path)
-        recordings = reader.recordings()
-        if len(recordings) == 1:
-            return reader.store()
+        with readable_name(path) as name:
+            reader = RrdReader(name)
+            recordings = reader.recordings()
+            if len(recordings) == 1:
+                return reader.store()  # which keeps the file open
     except Exception as error:  # noqa: BLE001 - Rerun raises RuntimeError, ValueError and others
         raise _damaged(path, error) from None
     raise RecordingError(f"{path}: holds {len(recordings)} recordings; brrt reads a file with one")

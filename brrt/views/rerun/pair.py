@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from brrt.comparison.difference import Difference
 from brrt.comparison.events import first_difference
 from brrt.events import Events
+from brrt.files import readable
 from brrt.formats.rrd.columns import time_columns
 from brrt.recording import Recording
 from brrt.views.colours import RUNS, Colour
@@ -86,7 +87,7 @@ def _log_difference(rec: Any, events: Events, difference: Difference) -> None:
     """Add a line to the text log at the first event that differs."""
     until = events.until(seq=difference.seq)
     last = max((table[-1] for table in until.tables.values()), key=lambda row: int(row["seq"]))
-    text = rr.TextLog.columns(text=[f"the runs part at {difference}"], level=["WARN"])
+    text = rr.TextLog.columns(text=[readable(f"the runs part at {difference}")], level=["WARN"])
     rec.send_columns("/difference", time_columns(times_of([last])), text)
 
 
@@ -95,7 +96,7 @@ def _layout(runs: tuple[Recording, Recording]) -> rrb.Blueprint:
     for letter, run in zip("AB", runs, strict=True):
         scenario = run.manifest.scenario
         title = f"{letter}: {run.name} ({scenario.planner}, seed {scenario.seed})"
-        worlds.append(layout.world_view(run.world, below=f"/{letter}", name=title))
+        worlds.append(layout.world_view(run.world, below=f"/{letter}", name=readable(title)))
     log = rrb.TextLogView(
         origin="/",
         contents=["/difference", "/A/log", "/B/log"],

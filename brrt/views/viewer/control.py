@@ -106,7 +106,7 @@ def shoot(
 
 def _load(client: ViewerClient, file: Path, cursor: Cursor | None) -> None:
     """Open a file, wait until all of it is loaded, and go to an instant."""
-    stores = client.open(str(file.resolve())).store_ids
+    stores = client.open(str(file.absolute())).store_ids
     if not stores:
         errors = [entry.message for entry in client.get_logs() if entry.level == "ERROR"]
         reason = errors[-1].splitlines()[0] if errors else "no reason given"
