@@ -6,6 +6,9 @@ from typing import Any, get_args
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+_MOST_DIGITS = 300
+"""Of a number with an exponent."""
+
 
 def whole_number(text: str) -> int:
     """Read a whole number, such as 5000 or 1e6.
@@ -16,8 +19,13 @@ def whole_number(text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        value = float(text)
-        if not value.is_integer():
+        from decimal import Decimal, InvalidOperation
+
+        try:
+            value = Decimal(text)
+        except InvalidOperation:
+            value = Decimal("nan")
+        if not value.is_finite() or value.adjusted() > _MOST_DIGITS or value != int(value):
             raise
         return int(value)
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from brrt.replay.text import counted, seconds, vector
 
+from .command import whole_number
 from .console import print_json, print_pairs
 
 if TYPE_CHECKING:
@@ -30,9 +31,13 @@ def tree_number(tree: str | None) -> int:
 
     if tree is None:
         return 0
-    if tree not in _TREES and not (tree.isdecimal() and int(tree) < 256):
+    try:
+        number = _TREES[tree] if tree in _TREES else whole_number(tree)
+    except ValueError:
+        number = -1
+    if not 0 <= number < 256:
         raise BrrtError(f"--tree must be start, goal or the number of a tree, not {tree!r}")
-    return _TREES[tree] if tree in _TREES else int(tree)
+    return number
 
 
 def print_node(

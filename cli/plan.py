@@ -1,11 +1,12 @@
 """`brrt plan`: run a planner and record it."""
 
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from brrt.shell import file_argument
 
 from .console import SIGNALLED, Code, announce_compilation, console, note, print_json
 from .options import At, AtEvent, AtIteration, instant
@@ -340,10 +341,13 @@ def _report(
     print_summary(metrics)
     shown = rrd or mcap  # brrt view opens the one faster that holds a drawing
     ways = [(mcap, "look inside", "replay"), (shown, "watch it", "view")]
-    for number, (path, what, command) in enumerate(way for way in ways if way[0] is not None):
-        typed = escape(shlex.quote(str(path)))
-        gap = "" if number else "\n"
+    gap = "\n"
+    for path, what, command in ways:
+        if path is None:
+            continue
+        typed = escape(file_argument(path))
         console().print(
             f"{gap}{escape(str(path))}: {what} with [bold]brrt {command} {typed}[/bold]",
             soft_wrap=True,
         )
+        gap = ""

@@ -1,6 +1,5 @@
 """Recordings as commands open them: complete files, and cut or damaged ones up to the fault."""
 
-import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from brrt.events import Events, Instant
 from brrt.formats import BrokenError, CutError, read
 from brrt.recording import Recording
 from brrt.replay.text import counted
+from brrt.shell import file_argument
 
 from .console import note
 
@@ -78,7 +78,7 @@ def fault(error: BrokenError, count: int, last: Instant) -> str:
 
 def refusal(error: BrokenError, count: int, last: Instant) -> str:
     """Describe what is wrong with a file, and how to use or save the rest of it."""
-    remedy = f"brrt recover {shlex.quote(str(error.path))} --out whole.mcap"
+    remedy = f"brrt recover {file_argument(error.path)} --out whole.mcap"
     rest = "them" if count else "the problem"
     return f"{fault(error, count, last)}: use {rest} with --partial, or save {rest} with {remedy}"
 

@@ -1,12 +1,13 @@
 """`brrt verify`: whether a recording keeps what its planner promises."""
 
-import shlex
 from dataclasses import asdict, replace
 from pathlib import Path
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from brrt.shell import file_word, join
 
 from .console import Code, announce_compilation, note, print_json, print_line, print_lines
 from .options import Json, Run
@@ -140,7 +141,7 @@ def _show_again(again: "Reproduction") -> None:
 def _view(run: Path, seq: int) -> str:
     """Return the command that shows an event; for the recording as a whole, its end."""
     at = ["--at-event", str(seq)] if seq >= 0 else []
-    return shlex.join(["brrt", "view", str(run), *at])
+    return join(["brrt", "view", file_word(run), *at])
 
 
 def _json(run: Path, result: "RuleResult") -> dict[str, Any]:

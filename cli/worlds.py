@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from brrt.replay.text import counted
+from brrt.shell import file_argument
 
 from .command import Command, Group
 from .console import (
@@ -145,10 +146,7 @@ def show(
     if picture is not None:
         print_line(f"\n{picture}: the picture")
     if rrd is not None:
-        from rich.markup import escape
-
-        name = escape(str(rrd))
-        console().print(f"\n{name}: open it with [bold]rerun {name}[/bold]", soft_wrap=True)
+        print_line(f"\n{rrd}: open it with rerun {file_argument(rrd)}")
 
 
 @app.command(cls=Command)
@@ -173,7 +171,7 @@ def make(
         made = _made(world, start, goal)
         made.save(file)
     what = ", ".join(_counts(_figures(made))) or "no obstacles"
-    text = f"{file}: {made.dim}D, {what}; plan in it with --world {file}"
+    text = f"{file}: {made.dim}D, {what}; plan in it with --world {file_argument(file)}"
     print_line(text)
 
 

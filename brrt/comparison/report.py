@@ -1,6 +1,5 @@
 """What a comparison found: as data, in plain text on a screen of 80 columns, and as JSON."""
 
-import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any, NamedTuple
 from brrt.comparison.difference import WIDTH, Difference, brief_pair, clipped
 from brrt.comparison.settings import Row
 from brrt.replay.text import seconds
+from brrt.shell import file_argument
 
 METRICS = (
     "path_cost", "smoothed_cost", "first_path_cost", "first_path_iteration", "iterations",
@@ -208,7 +208,7 @@ def _difference(found: Comparison) -> Iterator[str]:
         return
     yield from first.lines(("A", "B"), (found.cuts[0] is not None, found.cuts[1] is not None))
     if all(name and Path(name).exists() for name in found.names):  # runs in memory have no command
-        a, b = (shlex.quote(name) for name in found.names)
+        a, b = map(file_argument, found.names)
         partial = " --partial" if any(found.cuts) else ""
         yield ""
         yield f"brrt view {a} {b}{partial}"

@@ -1,6 +1,5 @@
 """Advice: what to try, as a command and as what that command plans."""
 
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from brrt.explanation.facts import Facts
 from brrt.explanation.report import WIDTH
 from brrt.scenario.command import plan_words, setting_words
 from brrt.scenario.scenario import Scenario
+from brrt.shell import file_word, join
 
 _PLENTY = 1_000_000
 """Iterations beyond which a budget is increased fourfold at most."""
@@ -47,11 +47,11 @@ class Advice:
     @property
     def command(self) -> str:
         """The command, in one line."""
-        return shlex.join(self._all())
+        return join(self._all())
 
     def numbered(self, number: int, file: str) -> "Advice":
         """Return it with an output of its own, named by the recording and the number."""
-        return replace(self, out=f"{Path(file).stem or 'run'}-{number}{self.suffix}")
+        return replace(self, out=file_word(f"{Path(file).stem or 'run'}-{number}{self.suffix}"))
 
     def as_dict(self) -> dict[str, Any]:
         """Return reason and command."""
@@ -80,15 +80,15 @@ def _parts(words: Sequence[str]) -> Iterator[str]:
     part: list[str] = []
     for word in words:
         if word.startswith("--") and part:
-            yield shlex.join(part)
+            yield join(part)
             part = []
         part.append(word)
-    yield shlex.join(part)
+    yield join(part)
 
 
 def file_of(f: Facts) -> str:
     """Return the recording's file, as it is written in commands."""
-    return f.file or _UNNAMED
+    return file_word(f.file or _UNNAMED)
 
 
 def show(why: str, *words: str, suffix: str = "") -> Advice:

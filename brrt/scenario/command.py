@@ -1,15 +1,15 @@
 """Scenarios as `brrt plan` commands."""
 
-import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from brrt.scenario.scenario import Scenario
+from brrt.shell import file_word, join
 
 
 def command(scenario: Scenario, out: str = "next.mcap") -> str:
     """Return the command that runs a scenario and records it to `out`."""
-    return shlex.join([*plan_words(scenario), "--out", out])
+    return join([*plan_words(scenario), "--out", file_word(out)])
 
 
 def plan_words(scenario: Scenario) -> list[str]:

@@ -3,6 +3,7 @@
 A new generator or file format is one class and one line in a registry below.
 """
 
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -152,7 +153,7 @@ def _choose_loader(path: Path) -> tuple[str, "type[Loader]"]:
         return candidates[0]
     if is_there(path) and not is_file(path):
         raise BrrtError(f"{path}: not a regular file, and its name has no {_suffixes()}")
-    head = read_bytes(path, "a world", _HEAD_BYTES, rest=False)
+    head = read_bytes(path, "a world", _HEAD_BYTES, rest=False).removeprefix(BOM_UTF8)
     for name, loader in candidates or LOADERS.items():
         if loader.recognises(head):
             return name, loader

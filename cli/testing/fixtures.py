@@ -14,6 +14,7 @@ import pytest
 
 from brrt import BrrtError, Comparison, Recording, compare, read
 from brrt.runs.reproduce import TOLERANCE
+from brrt.shell import file_argument
 from brrt.testing import golden
 from brrt.testing.gate import ALPHA, SEEDS, Verdict, check_question, gate
 from brrt.testing.seed_metrics import SeedMetrics, Source
@@ -120,9 +121,10 @@ class Golden:
         with _errors_as_failures():
             path = self._files.path(name, ".mcap")
             if run is None and not path.exists():
+                shown = self._files.shown(path)
                 raise BrrtError(
-                    f"no golden run {self._files.shown(path)}; give brrt_golden the run as well, "
-                    f"or make one: brrt plan --clock logical --out {self._files.shown(path)}"
+                    f"no golden run {shown}; give brrt_golden the run as well, or make one: "
+                    f"brrt plan --clock logical --out {file_argument(shown)}"
                 )
             if isinstance(run, str | Path):
                 self._files.record_use(Path(run))
@@ -156,7 +158,7 @@ class Golden:
 
     def _renew(self, path: Path, recording: Recording, tolerance: float) -> None:
         shown = self._files.shown(path)
-        lines = [f"{shown}: made; check it (brrt view {shown}) and commit it"]
+        lines = [f"{shown}: made; check it (brrt view {file_argument(shown)}) and commit it"]
         if path.exists():
             try:
                 found = self._compare(path, recording, tolerance, "the new run")

@@ -1,5 +1,7 @@
 """`brrt`: help, options, wrong usage, and what a command imports."""
 
+import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -83,6 +85,76 @@ def test_wrong_usage_is_one_line(args: list[str], message: str, brrt: Command) -
     assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
     assert message in done.err
     assert done.err.endswith("(see brrt --help)\n")
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["plan", "--seed", "1e3", "--iterations", "1E4", "--no-record", "--shortcuts", "5e0"], ""),
+        (["plan", "--at-event", "1e2", "--from", "none.mcap"], "none.mcap: No such file"),
+        (["plan", "--at-iteration", "2e0", "--from", "none.mcap"], "none.mcap: No such file"),
+        (["replay", "none.mcap", "--at-event", "1e2"], "none.mcap: No such file"),
+        (["replay", "none.mcap", "--node", "1e1", "--tree", "1e0"], "none.mcap: No such file"),
+        (["plot", "none.mcap", "--out", "a.png", "--dpi", "1e2"], "none.mcap: No such file"),
+        (["view", "none.mcap", "--web", "--port", "8e3"], "none.mcap: No such file"),
+        (["view", "none.mcap", "--web", "--port", "8e9"], "8e9 is not between 1 and 65535"),
+        (["replay", "none.mcap", "--at-event", "1e-2"], "'1e-2' is not a whole number."),
+    ],
+)
+def test_whole_numbers(args: list[str], message: str, brrt: Command) -> None:
+    """With an exponent, wherever a whole number is given."""
+    done = brrt(*args)
+    assert message in done.err
+    assert done.code == (2 if message else 0)
+    if not message:
+        assert "seed 1000" in done.out
+
+
+def test_whole_numbers_are_exact(brrt: Command) -> None:
+    """Beyond what a float holds."""
+    args = ("plan", "--no-record", "--world", "empty2d", "--json")
+    assert brrt(*args, "--seed", "1e23").json["seed"] == 10**23
+
+
+def test_the_package_is_the_command() -> None:
+    """`python -m brrt`; to import it runs nothing."""
+    done = subprocess.run(
+        [sys.executable, "-m", "brrt", "robots", "nonsense"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("brrt: unknown robot 'nonsense'")
+    import brrt.__main__  # noqa: F401
+
+
+@pytest.mark.parametrize("stem", ["-x", "a 'b'", "[bold]"])
+def test_printed_commands_work(stem: str, brrt: Command) -> None:
+    """Whatever the names of files, and for each command that prints commands."""
+
+    def run_printed(text: str) -> int:
+        found = re.findall(r"brrt (?:view|replay|recover|plan) .*", text.replace(" \\\n", " "))
+        for line in found:
+            words = shlex.split(line)[1:]
+            if words[0] != "view":
+                done = brrt(*words)
+                assert done.code in (0, 1), (line, done.err)
+            else:
+                assert all(Path(word).exists() for word in words[1:2])
+        return len(found)
+
+    mcap = f"{stem}.mcap"
+    planned = brrt("plan", f"--out={mcap}", "--iterations", "20", "--no-smooth")
+    assert run_printed(planned.out) == 2
+    other = brrt("plan", f"--out={stem}2.mcap", "--iterations", "20", "--seed", "1")
+    assert other.code == 1
+    assert run_printed(brrt("diff", "--", mcap, f"{stem}2.mcap").out) == 2
+    assert run_printed(brrt("explain", "--", mcap).out) >= 1
+    Path(mcap).write_bytes(Path(mcap).read_bytes()[:-500])
+    assert run_printed(brrt("verify", "--", mcap).err) == 1
+    made = brrt("worlds", "make", "empty2d", f"--out={stem}.json")
+    assert brrt("plan", "--no-record", *shlex.split(made.out)[-2:]).code == 0
 
 
 def test_without_a_command(brrt: Command) -> None:
