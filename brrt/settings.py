@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields
 from typing import Any, Literal, Self, get_args, get_origin, get_type_hints
 
+from brrt.digits import against_limits
 from brrt.errors import BrrtError, unknown
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
@@ -201,9 +202,14 @@ def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise BrrtError(f"{name} must be a finite number, not {value}")
     low, above, high = meta["low"], meta["above"], meta["high"]
-    if low is not None and value < low:
-        raise BrrtError(f"{name} must be at least {low:g}, not {_text(value)}")
+    text = _text(value)
     if above is not None and value <= above:
-        raise BrrtError(f"{name} must be above {above:g}, not {_text(value)}")
+        raise BrrtError(f"{name} must be above {above:g}, not {text}")
+    least, most = (f"{limit:g}" for limit in (low or 0, high or 0))
+    if isinstance(value, float):
+        limits = (-math.inf if low is None else low, math.inf if high is None else high)
+        text, least, most = against_limits(value, *limits)
+    if low is not None and value < low:
+        raise BrrtError(f"{name} must be at least {least}, not {text}")
     if high is not None and value > high:
-        raise BrrtError(f"{name} must be at most {high:g}, not {_text(value)}")
+        raise BrrtError(f"{name} must be at most {most}, not {text}")

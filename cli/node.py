@@ -48,6 +48,7 @@ def print_node(
     Raises:
         BrrtError: The node does not exist.
     """
+    from brrt.digits import digits_within
     from brrt.replay.node_history import NodeHistory
     from brrt.replay.snapshot import Snapshot
 
@@ -55,19 +56,20 @@ def print_node(
     if as_json:
         print_json(found.as_dict())
         return
-    rows = _of_node(found) if isinstance(found, NodeHistory) else _of_cell(found)
+    digits = digits_within(*recording.robot().bounds(recording.world))
+    rows = _of_node(found, digits) if isinstance(found, NodeHistory) else _of_cell(found, digits)
     print_pairs((name, text, "") for name, text in rows)
 
 
-def _of_node(h: "NodeHistory") -> Rows:
+def _of_node(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:
     from brrt.replay.node_history import tree_name
 
-    yield "node", f"{h.node:,} of {tree_name(h.tree)} at {vector(h.q)}"
+    yield "node", f"{h.node:,} of {tree_name(h.tree)} at {vector(h.q, digits)}"
     parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"
     yield "added", f"{_when(h.born)}; {parent}, cost {h.born_cost:.6g}"
     if h.sample is not None:
         other = "" if h.sample.tree == h.tree else f" for tree {h.sample.tree}"
-        drawn = f"{h.sample.source}{other}, {vector(h.sample.q)}"
+        drawn = f"{h.sample.source}{other}, {vector(h.sample.q, digits)}"
         yield "sample", f"event {h.sample.when.event:,}: {drawn}"
     yield from _listed(
         "rewired",
@@ -95,10 +97,10 @@ def _of_node(h: "NodeHistory") -> Rows:
     yield "from root", _lineage(h.lineage)
     on = [f"waypoint {i} of the {stage} path" for stage, i in h.paths.items()]
     yield "path", ", ".join(on) or "not on a path"
-    yield from _rejects(h)
+    yield from _rejects(h, digits)
 
 
-def _rejects(h: "NodeHistory") -> Rows:
+def _rejects(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:
     if not h.rejects:
         yield "rejected", "no extensions from this node"
         return
@@ -107,15 +109,15 @@ def _rejects(h: "NodeHistory") -> Rows:
     if h.hits():
         yield "", f"obstacles: {_counts(h.hits())}"
     lines = [
-        f"{_when(each.when)}; {each.reason} towards {vector(each.q)}"
+        f"{_when(each.when)}; {each.reason} towards {vector(each.q, digits)}"
         + (f", {each.hit}" if each.hit else "")
         for each in h.rejects
     ]
     yield from _listed("", lines)
 
 
-def _of_cell(h: "CellHistory") -> Rows:
-    yield "cell", f"{h.cell:,} at {vector(h.q)}, {h.distance:.6g} from the goal"
+def _of_cell(h: "CellHistory", digits: tuple[int, ...]) -> Rows:
+    yield "cell", f"{h.cell:,} at {vector(h.q, digits)}, {h.distance:.6g} from the goal"
     yield "expanded", counted(len(h.looks), "time")
     yield from _listed(
         "",

@@ -151,7 +151,7 @@ def _print_transcript(recording: "Recording", limits: "Limits") -> None:
     from brrt.replay.fold import feed
     from brrt.replay.transcript import Transcript
 
-    transcript = Transcript(recording.manifest, recording.robot())
+    transcript = Transcript(recording.manifest, recording.robot(), recording.world)
     feed(recording.batches(), [transcript], limits)
     print_lines(transcript.lines())
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from brrt.digits import digits_within, join_numbers
 from brrt.replay.text import counted
 from brrt.shell import file_argument
 
@@ -280,12 +281,14 @@ def _counts(figures: dict[str, Any]) -> Iterator[str]:
 
 def _rows(f: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
     yield "world", f["world"], ""
-    sides = zip(f["lower"], f["upper"], strict=True)
-    yield "bounds", f"{f['dim']}D, " + " x ".join(f"[{a:g}, {b:g}]" for a, b in sides), ""
+    digits = digits_within(f["lower"], f["upper"])
+    corners = (join_numbers(f[name], digits, " ").split() for name in ("lower", "upper"))
+    sides = zip(*corners, strict=True)
+    yield "bounds", f"{f['dim']}D, " + " x ".join(f"[{a}, {b}]" for a, b in sides), ""
     yield "obstacles", ", ".join(_counts(f)) or "none", ""
     yield "free", _share(f["free"], f["free_error"]), ""
     for name in ("start", "goal"):
-        yield name, "none" if f[name] is None else ", ".join(f"{v:g}" for v in f[name]), ""
+        yield name, "none" if f[name] is None else join_numbers(f[name], digits), ""
     if f["way"] is not None:
         style = {True: "bold green", False: "bold red", None: "bold yellow"}[f["connected"]]
         word = {True: "yes", False: "no", None: "unknown"}[f["connected"]]

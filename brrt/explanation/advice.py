@@ -82,7 +82,7 @@ def lookahead(f: Facts) -> Advice | None:
     deepest = f.cells["deepest"]
     why = (
         f"each cell was entered {often:.3g} times on average; the estimate at "
-        f"{place(deepest['q'])} rose by {deepest['learnt']:.4g}"
+        f"{place(f, deepest['q'])} rose by {deepest['learnt']:.4g}"
     )
     if ended_by_budget(f):  # the learnt estimates are valid for any lookahead
         return extend(f, why, 10, params={"lookahead": min(most, max(100, ten))})

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import digits_within
 from brrt.events import Reason, Source
 from brrt.explanation.clearance import Clearance, ClearanceSearch, Narrow
-from brrt.explanation.places import Blocker, Coverage, Gap, Places, Spot
+from brrt.explanation.places import PLACE_DIGITS, Blocker, Coverage, Gap, Places, Spot
 from brrt.explanation.summary import RunSummary
 from brrt.replay.snapshot import Snapshot
 from brrt.scenario.contract import Contract
@@ -125,6 +126,7 @@ class Facts:
         clearance: Whether there is a path, and how wide the widest is.
         progress: The paths that the planner found.
         cells: Sums over the cells of a lattice search; empty for other planners.
+        digits: Significant digits of each coordinate in texts, by the number of coordinates.
     """
 
     manifest: Manifest
@@ -147,6 +149,7 @@ class Facts:
     clearance: Clearance
     progress: Progress | None
     cells: dict[str, Any]
+    digits: dict[int, tuple[int, ...]]
 
     @property
     def scenario(self) -> Scenario:
@@ -177,7 +180,7 @@ class Facts:
     def as_dict(self) -> dict[str, Any]:
         """Return all but the manifest as plain numbers, texts, lists and dicts."""
         plain = asdict(self)
-        for name in ("manifest", "file", "ended"):
+        for name in ("manifest", "file", "ended", "digits"):
             del plain[name]
         clearance = plain.pop("clearance")
         clearance["way"] = clearance.pop("reason")
@@ -228,6 +231,10 @@ def facts(snapshot: Snapshot, file: str) -> Facts:
         clearance=replace(clearance, connected=True) if solved else clearance,
         progress=_progress(summary.paths, last),
         cells=summary.cells.as_dict(),
+        digits={
+            manifest.dof: digits_within(*robot.bounds(world), PLACE_DIGITS),
+            world.dim: digits_within(world.lower, world.upper, PLACE_DIGITS),
+        },
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.collision.motions import Obstacles, first_hits
+from brrt.digits import digits_within, join_numbers
 from brrt.explanation.summary import RunSummary
 from brrt.robots import Robot
 from brrt.worlds.free_space import occupied
@@ -25,6 +26,9 @@ _THIN = 1024
 """Nodes of each tree that are compared with those of the other."""
 
 _SHOWN = 3
+
+PLACE_DIGITS = 4
+"""Significant digits of coordinates, as `brrt.digits.digits_within` counts them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +135,9 @@ class Places:
         name = self._obstacles.name(j)
         if j >= len(self._obstacles) or name.startswith("the"):
             return name
-        low, high = self._obstacles.lower[j], self._obstacles.upper[j]
-        return f"{name} ({_numbers(low)} to {_numbers(high)})"
+        digits = digits_within(self._world.lower, self._world.upper, PLACE_DIGITS)
+        corners = (self._obstacles.lower[j], self._obstacles.upper[j])
+        return "{} ({} to {})".format(name, *(join_numbers(q, digits, ",") for q in corners))
 
     def spot(self, a: Floats, b: Floats) -> Spot | None:
         """Return the coarse cell with most of the middles of motions; see `blockers`."""
@@ -198,7 +203,3 @@ class Places:
 def coarse(world: World) -> Raster:
     """Return the coarse cells that shares of the free space are counted in."""
     return Raster.over(world.lower, world.upper, _CELLS[world.dim])
-
-
-def _numbers(values: Floats) -> str:
-    return ",".join(f"{x:.4g}" for x in values)

@@ -116,7 +116,7 @@ def _rejected(f: Facts) -> Iterator[Row]:
         yield "blocked by", _shares(f.blockers)
     if f.spot is not None and f.spot.share >= 0.05:
         sides = " x ".join(f"{side:.3g}" for side in f.spot.sides)
-        yield "region", f"{f.spot.share:.0%} of them within {sides} around {place(f.spot.q)}"
+        yield "region", f"{f.spot.share:.0%} of them within {sides} around {place(f, f.spot.q)}"
 
 
 def _shares(blockers: Sequence[Blocker]) -> str:
@@ -147,8 +147,8 @@ def _where(f: Facts, narrow: Narrow) -> str:
     for name, end in (("start", f.manifest.start), ("goal", f.manifest.goal)):
         near = min(narrow.high, _CORNER * f.extent)
         if f.clearance.body == 0 and dist(narrow.q, end[: len(narrow.q)]) <= near:
-            return f"{place(narrow.q)}, close to the {name}"
-    return place(narrow.q)
+            return f"{place(f, narrow.q)}, close to the {name}"
+    return place(f, narrow.q)
 
 
 def _beyond(narrow: Narrow, what: str) -> str:
@@ -165,7 +165,8 @@ def _goal(f: Facts) -> Iterator[Row]:
     if near is not None and near.far > 0 and not f.figures["solved"]:
         what = "cell" if f.cells else "node"
         far, start = _number(near.far), _number(near.start)
-        texts = [f"{what} {near.node:,} at {place(near.q)}, {far} from the goal (start: {start})"]
+        at = f"{what} {near.node:,} at {place(f, near.q)}"
+        texts = [f"{at}, {far} from the goal (start: {start})"]
         if near.since < _END:
             texts.append("reached at the very end")
         else:
@@ -174,10 +175,8 @@ def _goal(f: Facts) -> Iterator[Row]:
         yield "nearest", "; ".join(texts)
     if gap is not None:
         hit = f"; {gap.hit} is between them" if gap.hit else ""
-        yield (
-            "gap",
-            f"the trees are {gap.far:.4g} apart, at {place(gap.q)} and {place(gap.other)}{hit}",
-        )
+        at = f"{place(f, gap.q)} and {place(f, gap.other)}"
+        yield "gap", f"the trees are {gap.far:.4g} apart, at {at}{hit}"
     if goals is not None:
         texts = []
         if goals.drawn:
@@ -215,12 +214,12 @@ def _moves(f: Facts) -> Iterator[Row]:
     busiest, deepest = cells["busiest"], cells["deepest"]
     entered = "each cell was entered once"
     if busiest["visits"] > 1:
-        most = f"{place(busiest['q'])} {counted(busiest['visits'], 'time')}"
+        most = f"{place(f, busiest['q'])} {counted(busiest['visits'], 'time')}"
         entered = f"each cell was entered {cells['moves_per_cell']:.3g} times on average, {most}"
     yield "moves", f"{cells['moves']:,}; {entered}"
     if deepest["learnt"] > 0:
         rose = f"{_number(deepest['learnt'])} to {_number(deepest['estimate'])}"
-        yield "estimates", f"{cells['raised']:,} rose, most at {place(deepest['q'])}: by {rose}"
+        yield "estimates", f"{cells['raised']:,} rose, most at {place(f, deepest['q'])}: by {rose}"
 
 
 def _execution(f: Facts) -> Iterator[Row]:
@@ -246,9 +245,9 @@ def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.5g}"
 
 
-def place(q: Sequence[float]) -> str:
-    """Write a configuration or a point in four digits."""
-    return vector(q, 4)
+def place(f: Facts, q: Sequence[float]) -> str:
+    """Write a configuration or a point in digits that tell it apart."""
+    return vector(q, f.digits[len(q)])
 
 
 def table(found: Sequence[Row]) -> Iterator[str]:

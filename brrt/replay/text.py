@@ -1,6 +1,8 @@
 """Counts, durations and configurations as text."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+from brrt.digits import join_numbers, tell_apart
 
 
 def counted(number: int, one: str, several: str | None = None) -> str:
@@ -16,6 +18,12 @@ def seconds(value: float) -> str:
     return f"{value * 1e9:.0f} ns"
 
 
-def vector(values: Iterable[float], digits: int = 6) -> str:
-    """Write a configuration or a point: `(1.5, 2)`."""
-    return "(" + ", ".join(f"{x:.{digits}g}" for x in values) + ")"
+def vector(values: Iterable[float], digits: int | Sequence[int] = 12) -> str:
+    """Write a configuration or a point: `(1.5, 2)`; see `brrt.digits.digits_within`."""
+    return f"({join_numbers(values, digits)})"
+
+
+def vectors(*each: Iterable[float]) -> list[str]:
+    """Write configurations or points in digits that tell their coordinates apart."""
+    columns = [tell_apart(*values) for values in zip(*each, strict=True)]
+    return [f"({', '.join(row)})" for row in zip(*columns, strict=True)]

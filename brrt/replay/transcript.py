@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import digits_within, join_numbers
 from brrt.events import COUNTS, FIELDS, Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.fold import feed
 from brrt.robots import Robot
 from brrt.scenario.contracts import changes_of, planner_settings
 from brrt.scenario.manifest import Manifest
+from brrt.worlds.world import World
 
 Line = tuple[int, str]
 """Iteration and text."""
@@ -29,10 +31,12 @@ class Transcript:
     Args:
         manifest: The run's manifest.
         robot: The robot, which measures the distance to the goal.
+        world: The world, whose bounds decide how many digits places have.
     """
 
-    def __init__(self, manifest: Manifest, robot: Robot) -> None:
+    def __init__(self, manifest: Manifest, robot: Robot, world: World) -> None:
         self._manifest, self._robot = manifest, robot
+        self._digits = digits_within(*robot.bounds(world))
         self._lines: list[Line] = []
         self._counts: dict[tuple[Kind, int], int] = {}
         self._path: Any = None
@@ -76,7 +80,7 @@ class Transcript:
         if settings:
             yield "with " + ", ".join(f"{name} {_text(value)}" for name, value in settings.items())
         ends = (self._manifest.start, self._manifest.goal)
-        yield "from {} to {}".format(*(", ".join(map(_text, q)) for q in ends))
+        yield "from {} to {}".format(*(join_numbers(q, self._digits) for q in ends))
         for branch, change in zip(self._manifest.branches, changes_of(self._manifest), strict=True):
             yield f"at iteration {branch.iteration:,} of {branch.file}: {change}"
 
@@ -182,6 +186,6 @@ def _text(value: Any) -> str:
 
 def transcript(recording: Recording) -> str:
     """Return a run as plain text without times, the same on every machine."""
-    found = Transcript(recording.manifest, recording.robot())
+    found = Transcript(recording.manifest, recording.robot(), recording.world)
     feed(recording.batches(), [found])
     return "\n".join(found.lines()) + "\n"

@@ -8,11 +8,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import against_limits, tell_apart
 from brrt.errors import BrrtError
 from brrt.robots.angles import angle_differences, angle_distances, rotation, wrap_angles
 from brrt.robots.robot import Floats, Robot, blocked, check_fields, numbers_of, plane_only
 from brrt.settings import param
-from brrt.worlds.convex import convex_polygon, touching_pair
+from brrt.worlds.convex import convex_polygon, gap, touching_pair
 from brrt.worlds.world import World
 
 _MOST_LINKS = 64
@@ -21,6 +22,8 @@ _AUTO_REACH, _AUTO_WIDTH = 0.4, 0.1
 a part of its length."""
 
 _QUARTER_TURN = math.pi / 2
+_LIMITS = (-_QUARTER_TURN, _QUARTER_TURN)
+"""Limits of a joint for which a file states none; `null` in the file is no limits."""
 
 
 class Joint(NamedTuple):
@@ -145,13 +148,27 @@ class Chain(Robot):
         """See `Robot.collision`."""
         for i, joint in enumerate(self.joints):
             if joint.limits is not None and not joint.limits[0] <= q[i] <= joint.limits[1]:
-                low, high = joint.limits
-                return f"has joint {i + 1} at {q[i]:g}, beyond its limits {low:g} to {high:g}"
+                at, low, high = against_limits(float(q[i]), joint.limits[0], joint.limits[1])
+                own = "" if joint.limits != _LIMITS else " (the default)"
+                return f"has joint {i + 1} at {at}, beyond its limits {low} to {high}{own}"
         parts = self.outline(q)
         pair = touching_pair(parts, 2) if self.self_collision else None
         if pair is not None:
             return f"has links {pair[0] + 1} and {pair[1] + 1} touch each other"
         return blocked(world, parts)
+
+    def misfit(self, world: World) -> str | None:
+        """See `Robot.misfit`; a link that contains its joint keeps the base where it is."""
+        first, base = self.joints[0], self.base + np.array(self.joints[0].offset)
+        if gap(np.zeros((1, 2)), first.link) > 0:
+            return Robot.misfit(self, world)
+        why = blocked(world, [base[None]])
+        if why is None:
+            return Robot.misfit(self, world)
+        return (
+            f"its base ({world.text(base)}) {why}, so "
+            f"no configuration is free; move it by base_x and base_y, or base in the robot's file"
+        )
 
     def distance(self, a: Floats, b: Floats) -> Floats:
         """See `Robot.distance`."""
@@ -209,9 +226,10 @@ def _joint(name: str, data: Any) -> Joint:
     check_fields(data, name, ("offset", "link"), "limits")
     offset = numbers_of(f"{name} offset", data["offset"], 2)
     link = convex_polygon(f"robot: {name} link", data["link"])
-    limits = data.get("limits", (-_QUARTER_TURN, _QUARTER_TURN))
+    limits = data.get("limits", _LIMITS)
     if limits is not None:
         limits = numbers_of(f"{name} limits (null for none)", limits, 2)
         if limits[0] >= limits[1]:
-            raise BrrtError(f"robot: {name} limits {limits[0]:g}, {limits[1]:g} must rise")
+            texts = ", ".join(tell_apart(*limits))
+            raise BrrtError(f"robot: {name} limits {texts} must rise")
     return Joint(offset, link, limits)

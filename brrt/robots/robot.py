@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import tell_apart
 from brrt.errors import BrrtError
 from brrt.settings import Settings
 from brrt.worlds.world import World
@@ -53,6 +54,18 @@ class Robot(Settings):
     @abstractmethod
     def collision(self, world: World, q: Floats) -> str | None:
         """Say why a configuration, shape (dof,), is not free, or return None if it is."""
+
+    def misfit(self, world: World) -> str | None:
+        """Say why no configuration of a resolved robot is free, as far as that is easy to see."""
+        size = world.upper - world.lower
+        diagonal = float(np.hypot.reduce(size))
+        for part in self.outline(np.zeros(self.dof(world))):
+            far = part[np.hypot(*(part - part[0]).T).argmax()]
+            long = float(np.hypot(*(part - far).T).max())
+            if long >= diagonal:
+                texts = tell_apart(long, diagonal)
+                return f"a part of it is {texts[0]} long, and the diagonal of the bounds {texts[1]}"
+        return None
 
     @abstractmethod
     def distance(self, a: Floats, b: Floats) -> Floats:

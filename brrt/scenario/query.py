@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import against_limits, digits_within, join_numbers
 from brrt.errors import BrrtError
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
@@ -46,8 +47,9 @@ class Query:
     upper: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        """Resolve the robot; check start and goal."""
+        """Resolve the robot; check that it fits, and start and goal."""
         object.__setattr__(self, "robot", self.robot.resolved(self.world))
+        _check_fits(self.robot, self.world)
         lower, upper = self.robot.bounds(self.world)
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
@@ -56,24 +58,26 @@ class Query:
             object.__setattr__(self, name, self._checked(name, q))
 
     def _checked(self, name: str, q: Floats) -> Floats:
-        text = _text(q)
         if len(q) != self.dof:
             names = ",".join(self.robot.coordinates(self.world))
             raise BrrtError(
-                f"{name} {text}: {len(q)} given; a configuration here has {self.dof} numbers: "
-                f"{names}"
+                f"{name} {join_numbers(q, separator=',')}: {len(q)} given; a configuration here "
+                f"has {self.dof} numbers: {names}"
             )
         if not np.isfinite(q).all():
-            raise BrrtError(f"{name} {text} must be finite numbers")
+            raise BrrtError(f"{name} {join_numbers(q, separator=',')} must be finite numbers")
         q = self.robot.canonical(q)
         why = self.robot.collision(self.world, q)
         if why is not None:
             # In a map, what is unknown and how it counts is often the reason.
             known = self.world.notes[:1] if self.world.grid is not None else ()
             notes = "".join(f" (note: {note})" for note in known)
+            digits = digits_within(self.lower, self.upper)
+            columns = (q.tolist(), self.lower.tolist(), self.upper.tolist(), digits)
+            texts = [against_limits(*row) for row in zip(*columns, strict=True)]
+            text, low, high = (",".join(row) for row in zip(*texts, strict=True))
             raise BrrtError(
-                f"{name} {text} {why}; choose a free one between {_text(self.lower)} and "
-                f"{_text(self.upper)}{notes}"
+                f"{name} {text} {why}; choose a free one between {low} and {high}{notes}"
             )
         return q
 
@@ -97,7 +101,9 @@ class Query:
             own = (world.start, world.goal)[place]
             if isinstance(given[place], str):
                 rng = np.random.Generator(np.random.PCG64([scenario.seed, place + 1]))
-                ends[place] = random_configuration(name, robot.resolved(world), world, rng)
+                resolved = robot.resolved(world)
+                _check_fits(resolved, world)
+                ends[place] = random_configuration(name, resolved, world, rng)
             elif ends[place] is None and own is not None:
                 ends[place] = robot.configuration(own)
         start, goal = ends
@@ -125,8 +131,15 @@ class Query:
         return self.robot.dof(self.world)
 
 
-def _text(q: Floats) -> str:
-    return ",".join(f"{x:g}" for x in q)
+def _check_fits(robot: Robot, world: World) -> None:
+    """Check that nothing is known that makes every configuration of a resolved robot collide.
+
+    Raises:
+        BrrtError: No configuration is free.
+    """
+    why = robot.misfit(world)
+    if why is not None:
+        raise BrrtError(f"robot {robot.kind}: {why}")
 
 
 def random_configuration(name: str, robot: Robot, world: World, rng: np.random.Generator) -> Floats:
@@ -148,5 +161,5 @@ def random_configuration(name: str, robot: Robot, world: World, rng: np.random.G
             return q
     raise BrrtError(
         f"none of {_DRAWS:,} random configurations for the {name} is free in world {world.name}; "
-        f"give --{name} or make the obstacles smaller or fewer"
+        f"give --{name}, or make robot or obstacles smaller or the obstacles fewer"
     )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from brrt.digits import digits_within, join_numbers
 from brrt.errors import BrrtError
 from brrt.worlds.arrays import Floats, read_numbers
 
@@ -84,10 +85,9 @@ def _hull_of_convex(name: str, vertices: Floats) -> Floats:
     turns, lengths, angle = _turns(vertices)
     concave = turns < -_ROUNDING * lengths
     if concave.any() or abs(angle - 2 * np.pi) > 1:
-        at = vertices[int(turns.argmin())]
-        raise BrrtError(
-            f"{name} is not convex at ({at[0]:g}, {at[1]:g}); split it into convex polygons"
-        )
+        digits = digits_within(vertices.min(axis=0), vertices.max(axis=0))
+        text = join_numbers(vertices[int(turns.argmin())], digits)
+        raise BrrtError(f"{name} is not convex at ({text}); split it into convex polygons")
     while len(vertices) > 2 and (turns <= 0).any():
         vertices = np.delete(vertices, int(turns.argmin()), axis=0)
         turns, _, _ = _turns(vertices)

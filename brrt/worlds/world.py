@@ -2,13 +2,14 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from brrt.digits import digits_within, join_numbers, tell_apart
 from brrt.errors import BrrtError, unknown
 from brrt.files import parse_json, replacing
 from brrt.worlds.arrays import Floats, read_numbers
@@ -100,12 +101,16 @@ class World:
     def _check_ranges(self, dim: int) -> None:
         """Check that minima are below maxima, and that the grid fits the dimension."""
         if not (self.lower < self.upper).all():
-            bounds = f"{_numbers(self.lower)} to {_numbers(self.upper)}"
-            raise BrrtError(f"world: each upper bound must be above its lower bound, not {bounds}")
+            i = int((self.lower < self.upper).argmin())
+            bounds = " to ".join(tell_apart(float(self.lower[i]), float(self.upper[i])))
+            raise BrrtError(
+                f"world: each upper bound must be above its lower bound, but {'xyz'[i]} is from "
+                f"{bounds}"
+            )
         crossed = (self.boxes[:, :dim] > self.boxes[:, dim:]).any(axis=1)
         if crossed.any():
             i = int(crossed.argmax())
-            row = _numbers(self.boxes[i])
+            row = ", ".join(tell_apart(*self.boxes[i].tolist()))
             raise BrrtError(f"world: boxes[{i}] has a minimum above its maximum: {row}")
         if (self.balls[:, dim] < 0).any():
             i = int((self.balls[:, dim] < 0).argmax())
@@ -126,6 +131,10 @@ class World:
         """The longest side of the bounds."""
         return float((self.upper - self.lower).max())
 
+    def text(self, point: Iterable[float]) -> str:
+        """Write a point, shape (d,), in digits that tell it apart from others in the bounds."""
+        return join_numbers(point, digits_within(self.lower, self.upper))
+
     def inside(self, point: Sequence[float] | Floats) -> bool:
         """Whether a point, shape (d,), lies within the closed bounds."""
         p = np.asarray(point)
@@ -144,7 +153,7 @@ class World:
         if d == 3:
             return None
         if self.grid is not None and self.grid.covers(p[None]).any():
-            return f"the map's blocked cells at {_numbers(p)}"
+            return f"the map's blocked cells at {self.text(p)}"
         return self._polygon_at(p[None])
 
     def obstacle_touching(self, shape: Floats) -> str | None:
@@ -166,7 +175,7 @@ class World:
             if gap(shape, self.balls[i : i + 1, :2]) <= self.balls[i, 2]:
                 return self._ball_text(i)
         if self.grid is not None and self.grid.touches(shape):
-            return f"the map's blocked cells about {_numbers(shape.mean(axis=0))}"
+            return f"the map's blocked cells about {self.text(shape.mean(axis=0))}"
         return self._polygon_at(shape)
 
     def _polygon_at(self, shape: Floats) -> str | None:
@@ -174,16 +183,16 @@ class World:
         for i, polygon in enumerate(self.polygons):
             apart = (polygon.max(axis=0) < low).any() or (high < polygon.min(axis=0)).any()
             if not apart and gap(shape, polygon) <= 0:
-                return f"polygon {i} (about {_numbers(polygon.mean(axis=0))})"
+                return f"polygon {i} (about {self.text(polygon.mean(axis=0))})"
         return None
 
     def _box_text(self, i: int) -> str:
         low, high = np.split(self.boxes[i], 2)
-        return f"box {i} ({_numbers(low)} to {_numbers(high)})"
+        return f"box {i} ({self.text(low)} to {self.text(high)})"
 
     def _ball_text(self, i: int) -> str:
         *centre, radius = self.balls[i]
-        return f"ball {i} (centre {_numbers(centre)}, radius {radius:g})"
+        return f"ball {i} (centre {self.text(centre)}, radius {radius:g})"
 
     def without_grid(self) -> "World":
         """Return the same world with boxes, or polygons if it is turned, in place of its grid."""
@@ -255,15 +264,11 @@ class World:
         counts = [f"{len(getattr(self, name))} {name}" for name in ("balls", "boxes", "polygons")]
         cells = [] if self.grid is None else ["{} x {} cells".format(*self.grid.cells.shape)]
         ends = [
-            f"{name} {_numbers(point)}"
+            f"{name} {self.text(point)}"
             for name, point in (("start", self.start), ("goal", self.goal))
             if point is not None
         ]
         some = [count for count in counts if not count.startswith("0 ")]
-        bounds = f"{_numbers(self.lower)} to {_numbers(self.upper)}"
+        bounds = f"{self.text(self.lower)} to {self.text(self.upper)}"
         parts = [repr(self.name), bounds, *some, *cells, *ends]
         return f"<World {'; '.join(parts)}>"
-
-
-def _numbers(values: Sequence[float] | Floats) -> str:
-    return ", ".join(f"{v:g}" for v in values)

@@ -1,13 +1,16 @@
 """The facts in words."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from brrt import (
     Scenario,
+    World,
     read,
     snapshot,
 )
@@ -60,3 +63,23 @@ def test_a_solved_run(brrt: Command) -> None:
     assert "the run's path leads through it" in " ".join(done.split())
     assert "got through" not in done
     assert "nearest" not in done
+
+
+def test_places_far_from_the_origin(brrt: Command) -> None:
+    """Places in a world of 20 m at UTM coordinates differ in explain, replay --node and show."""
+    World(
+        "utm", np.array([388096.25, 3948996.5]), np.array([388116.25, 3949016.5]),
+        boxes=np.array([[388104.25, 3948996.5, 388106.25, 3949014.5]]),
+        start=np.array([388097.25, 3949006.5]), goal=np.array([388115.25, 3949006.5]),
+    ).save("utm.json")  # fmt: skip
+    brrt("plan", "--world", "utm.json", "--iterations", 300, "--out", "run.mcap")
+    explained = " ".join(brrt("explain", "run.mcap").out.split())
+    assert "box 0 (388104.25,3948996.5 to 388106.25,3949014.5)" in explained
+    assert re.search(r"around \(38810\d\.\d+, 39490\d\d\.\d+\)", explained)
+    node = brrt("replay", "run.mcap", "--node", 3).out
+    assert re.search(r"at \(38\d{4}\.\d+, 39490\d\d\.\d+\)", node)
+    shown = brrt("worlds", "show", "utm.json").out
+    assert "[388096.25, 388116.25] x [3948996.5, 3949016.5]" in shown
+    assert "388097.25, 3949006.5" in shown
+    text = brrt("replay", "run.mcap", "--text").out
+    assert "from 388097.25, 3949006.5 to 388115.25, 3949006.5" in text

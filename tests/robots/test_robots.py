@@ -109,7 +109,7 @@ def test_all_links_point_right_at_zero() -> None:
     np.testing.assert_allclose(lefts, [10.0, 12.0, 14.0])
     assert all(joint.limits == (-math.pi / 2, math.pi / 2) for joint in arm.joints)
     why = arm.collision(world, np.array([0.0, 1.6, 0.0]))
-    assert why == "has joint 2 at 1.6, beyond its limits -1.5708 to 1.5708"
+    assert why == "has joint 2 at 1.6, beyond its limits -1.57079 to 1.57079 (the default)"
 
 
 def test_self_collision() -> None:

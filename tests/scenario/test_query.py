@@ -1,13 +1,18 @@
-"""Random starts and goals."""
+"""Starts and goals: random ones, and messages that refuse a query."""
 
+import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from brrt import BrrtError, Kind, Memory, Problem, Run, Scenario, make_robot
+from brrt import BrrtError, Kind, Memory, Problem, Run, Scenario, World, make_robot
+from brrt.robots import ROBOTS as ROBOT_CLASSES
+from brrt.scenario.query import Query
 from tests.conftest import Result, findings_of
 
 ROBOTS = {
@@ -124,3 +129,70 @@ def test_a_chain_keeps_its_base_free() -> None:
         position = robot.position(problem.start)
         assert position is not None
         assert problem.world.obstacle_at(position) is None
+
+
+def refused(scenario: Scenario, world: World | None = None) -> str:
+    """Return the message that refuses a query."""
+    with pytest.raises(BrrtError) as error:
+        Problem.of(scenario, world)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("start", [(1.5708, 0.0), (math.nextafter(math.pi / 2, 9), 0.0), (0, -2)])
+def test_advised_limits_are_accepted(start: tuple[float, ...]) -> None:
+    """A joint beyond its limits reads differently than these, which are accepted as written."""
+    arm = Scenario(world="empty2d", robot="chain:links=2", start=start, goal=(0, 0))
+    message = refused(arm)
+    value, low, high = re.findall(r"at (\S+), beyond its limits (\S+) to (\S+)", message)[0]
+    assert not float(low) <= float(value) <= float(high)
+    for corner in re.findall(r"between (\S+) and (\S+)", message)[0]:
+        assert Problem.of(replace(arm, start=corner)).start is not None
+
+
+def test_far_from_the_origin() -> None:
+    """Start, obstacle and bounds have the digits in which places of the world differ."""
+    world = World(
+        "utm", np.array([388096.25, 3948996.5]), np.array([388116.25, 3949016.5]),
+        boxes=np.array([[388104.25, 3948997.0, 388106.25, 3949011.0]]),
+    )  # fmt: skip
+    start, goal = (388105.25, 3949000.5), (388115.0, 3949006.5)
+    assert refused(Scenario(start=start, goal=goal), world) == (
+        "start 388105.25,3949000.5 is in collision with box 0 (388104.25, 3948997 to 388106.25, "
+        "3949011); choose a free one between 388096.25,3948996.5 and 388116.25,3949016.5"
+    )
+    outside = (388116.2500001, 3949000.5)
+    assert refused(Scenario(start=outside, goal=goal), world).startswith(
+        "start 388116.2500001,3949000.5 is outside the bounds; choose"
+    )
+
+
+@pytest.mark.parametrize("start", ["random", (0.0, 0.0)])
+def test_a_base_in_an_obstacle(start: Any) -> None:
+    """No start helps a chain whose base is not free: the message names the base."""
+    world = World("w", np.zeros(2), np.full(2, 20.0), boxes=np.array([[5.0, 5.0, 15.0, 15.0]]))
+    arm = Scenario(robot="chain:links=2", start=start, goal=start)
+    assert refused(arm, world) == (
+        "robot chain: its base (10, 10) is in collision with box 0 (5, 5 to 15, 15), so no "
+        "configuration is free; move it by base_x and base_y, or base in the robot's file"
+    )
+    moved = replace(arm, robot="chain:links=2,base_x=2.5,base_y=2.5,length=1")
+    assert Problem.of(moved, world).robot.misfit(world) is None
+    outside = replace(arm, robot="chain:links=2,base_x=-1,base_y=3")
+    assert "its base (-1, 3) reaches the bounds, so no" in refused(outside, world)
+
+
+def test_a_joint_aside_of_its_link() -> None:
+    """A base in an obstacle does not matter if no link covers it."""
+    world = World("w", np.zeros(2), np.full(2, 20.0), boxes=np.array([[9.9, 9.9, 10.1, 10.1]]))
+    joint = {"offset": [0, 0], "link": [[1, -0.1], [2, -0.1], [2, 0.1]], "limits": None}
+    arm = ROBOT_CLASSES["chain"].from_definition({"base": [10, 10], "joints": [joint]})
+    scene = Scenario(start=(0.0,), goal=(3.0,))
+    assert Query.of(scene, world, arm).robot.collision(world, np.zeros(1)) is None
+
+
+@pytest.mark.parametrize("robot", ["polygon:length=200", "chain:links=1,length=150"])
+def test_a_body_longer_than_the_map(robot: str) -> None:
+    """A body that fits nowhere is refused as that, whatever start is given."""
+    for start in ("random", None, (0.0,)):
+        message = refused(Scenario(world="empty2d", robot=robot, start=start, goal="random"))
+        assert " long, and the diagonal of the bounds 141.421" in message

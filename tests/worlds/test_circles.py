@@ -41,7 +41,7 @@ def test_queries(tmp_path: Path) -> None:
         assert refused(partial(make_world, f"{path}{spec}")).startswith(f"{path}{message}")
     path.write_text("0 start: 1 2\n0 goal: 70 2\n")
     assert refused(lambda: load_world(path)) == (
-        f"{path}: the goal 70, 2 is outside the bounds of the circles; give {path}:margin=10"
+        f"{path}: the goal 70, 2 is outside the bounds of the circles; give {path}:margin=63"
     )
     assert make_world(f"{path}:margin=63").goal is not None
     path.rename(tmp_path / "queries_of_no_circles.txt")

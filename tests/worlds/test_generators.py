@@ -358,7 +358,7 @@ def test_only_one_end_given(name: str) -> None:
         ("maze2d:corridor=5,wall=5", "corridor and wall follow from each other"),
         ("rooms2d:door=24", "door 24 does not fit; a room's side is 23.125"),
         ("rooms2d:wall=40", "wall 40 leaves no room for 4 cells"),
-        ("spiral2d:wall=20", "wall 20 leaves no room for 7 cells; make it below 16.6667"),
+        ("spiral2d:wall=20", "wall 20 leaves no room for 7 cells; make it below 16.6666"),
         ("gap2d:gap=101", "gap 101 does not fit the map; it is at most 100"),
         ("passage3d:wall=81", "wall 81 does not fit the map; it is at most 80"),
         ("gap2d:height=0.5", "unknown parameter of world gap2d 'height'"),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Kind, Phase, Stage, Status, Table
-from brrt.replay.text import vector
+from brrt.replay.text import vectors
 from brrt.verification.context import Context
 from brrt.verification.rule import ANY_PART, Rule
 from brrt.verification.tree_history import TreeHistory
@@ -30,9 +30,9 @@ class PathEnds(Rule):
             if not len(path):
                 wrong = "a path without waypoints"
             elif (path[0] != start).any():
-                wrong = f"begins at {vector(path[0])}; the start is {vector(start)}"
+                wrong = "begins at {}; the start is {}".format(*vectors(path[0], start))
             elif (path[-1] != goal).any():
-                wrong = f"ends at {vector(path[-1])}; the goal is {vector(goal)}"
+                wrong = "ends at {}; the goal is {}".format(*vectors(path[-1], goal))
             self.judge_one(event, wrong)
 
 

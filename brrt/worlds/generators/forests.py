@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from brrt.digits import against_limits, tell_apart
 from brrt.errors import BrrtError
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats
@@ -103,10 +104,11 @@ class PoissonForest(Seeded):
         Seeded.__post_init__(self)
         self.check_fits(("radius", self.trunk, self.size / 2))
         if ((self.size - 2 * self.trunk) / self.apart) ** 2 > _MOST:
-            least = self.size / np.sqrt(_MOST)
+            enough = float(self.size / np.sqrt(_MOST))
+            text, least, _ = against_limits(self.apart, enough, np.inf)
             raise BrrtError(
-                f"trees {self.apart:g} apart are too many for the map; make twice the radius plus "
-                f"the gap at least {least:g}"
+                f"trees {text} apart are too many for the map; make twice the radius plus the gap "
+                f"at least {least}"
             )
 
     @property
@@ -161,9 +163,8 @@ class Forest3D(PoissonForest):
         """Check the heights as well."""
         PoissonForest.__post_init__(self)
         if self.min_height > self.max_height:
-            raise BrrtError(
-                f"min_height {self.min_height:g} is above max_height {self.max_height:g}; swap them"
-            )
+            texts = tell_apart(self.min_height, self.max_height)
+            raise BrrtError(f"min_height {texts[0]} is above max_height {texts[1]}; swap them")
 
     def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
         """Draw the trees, then their heights."""

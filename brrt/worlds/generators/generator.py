@@ -7,6 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from brrt.digits import against_limits
 from brrt.errors import BrrtError
 from brrt.settings import Settings, param
 from brrt.worlds.arrays import Floats
@@ -102,7 +103,8 @@ class Generator(Settings):
         """
         for name, value, most in limits:
             if value > most:
-                raise BrrtError(f"{name} {value:g} does not fit the map; it is at most {most:g}")
+                text, _, limit = against_limits(value, -np.inf, most)
+                raise BrrtError(f"{name} {text} does not fit the map; it is at most {limit}")
 
     def make(
         self,

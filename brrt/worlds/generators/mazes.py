@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from brrt.digits import against_limits
 from brrt.errors import BrrtError
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats, Ints
@@ -78,7 +79,8 @@ def _edges(size: float, cells: int, wall: float) -> Floats:
 def _check_wall(size: float, cells: int, wall: float) -> None:
     most = size / (cells - 1) if cells > 1 else size
     if wall >= most:
-        raise BrrtError(f"wall {wall:g} leaves no room for {cells} cells; make it below {most:g}")
+        text, _, limit = against_limits(wall, -np.inf, most)
+        raise BrrtError(f"wall {text} leaves no room for {cells} cells; make it below {limit}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +108,10 @@ class Maze2D(Seeded):
                 "corridor and wall follow from each other, size and cells; give one of them"
             )
         if self.corridor is not None and self.corridor * self.cells >= self.size:
+            text, _, limit = against_limits(self.corridor, -np.inf, self.size / self.cells)
             raise BrrtError(
-                f"corridor {self.corridor:g} leaves no room for walls between {self.cells} cells; "
-                f"make it below {self.size / self.cells:g}"
+                f"corridor {text} leaves no room for walls between {self.cells} cells; make it "
+                f"below {limit}"
             )
         _check_wall(self.size, self.cells, self.thickness)
 
@@ -165,7 +168,8 @@ class Rooms2D(Seeded):
         Seeded.__post_init__(self)
         _check_wall(self.size, self.rooms, self.thickness)
         if self.width > self.side:
-            raise BrrtError(f"door {self.width:g} does not fit; a room's side is {self.side:g}")
+            text, _, limit = against_limits(self.width, -np.inf, self.side)
+            raise BrrtError(f"door {text} does not fit; a room's side is {limit}")
 
     @property
     def thickness(self) -> float:

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from brrt.digits import tell_apart
 from brrt.errors import BrrtError
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats
@@ -99,7 +100,8 @@ class Scattered(Seeded):
 
     def _check_range(self, what: str, low: float, high: float, limit: float) -> None:
         if low > high:
-            raise BrrtError(f"min_{what} {low:g} is above max_{what} {high:g}; swap them")
+            texts = tell_apart(low, high)
+            raise BrrtError(f"min_{what} {texts[0]} is above max_{what} {texts[1]}; swap them")
         self.check_fits((f"max_{what}", high, limit))
 
 

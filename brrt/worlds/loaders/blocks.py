@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from brrt.digits import tell_apart
 from brrt.errors import BrrtError
 from brrt.files import lines_of
 from brrt.worlds.arrays import Floats
@@ -81,7 +82,8 @@ def _corners(where: str, words: list[str]) -> list[float]:
     numbers = finite(where, words)
     for axis, low, high in zip("xyz", numbers[:3], numbers[3:6], strict=True):
         if low > high:
-            raise BrrtError(f"{where}: {axis}min {low:g} is above {axis}max {high:g}")
+            texts = tell_apart(low, high)
+            raise BrrtError(f"{where}: {axis}min {texts[0]} is above {axis}max {texts[1]}")
     return numbers[:_CORNERS]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from brrt.digits import at_least, digits_within, join_numbers
 from brrt.errors import BrrtError
 from brrt.files import is_file, lines_of
 from brrt.settings import param
@@ -69,9 +70,10 @@ class OmplCircles(Loader):
         start, goal = (None, None) if ends is None else ends
         for what, end in (("start", start), ("goal", goal)):
             if end is not None and not ((lower <= end) & (end <= upper)).all():
+                by = float(np.maximum(lower - end, end - upper).max()) + self.margin
                 raise BrrtError(
-                    f"{path}: the {what} {end[0]:g}, {end[1]:g} is outside the bounds of the "
-                    f"circles; give {path}:margin=10"
+                    f"{path}: the {what} {join_numbers(end, digits_within(lower, upper))} is "
+                    f"outside the bounds of the circles; give {path}:margin={at_least(by, 2)}"
                 )
         return World(str(path), lower, upper, balls=circles, start=start, goal=goal, notes=notes)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import tell_apart
 from brrt.errors import BrrtError
 from brrt.files import is_file
 from brrt.settings import param
@@ -144,10 +145,11 @@ def _thresholds(fields: "YamlFields") -> tuple[float, float]:
     occupied, free = fields.number("occupied_thresh"), fields.number("free_thresh")
     for name, value in (("occupied_thresh", occupied), ("free_thresh", free)):
         if not 0 <= value <= 1:
-            raise BrrtError(f"{fields.where(name)} must be from 0 to 1, not {value:g}")
+            raise BrrtError(f"{fields.where(name)} must be from 0 to 1, not {value!r}")
     if free >= occupied:
+        texts = tell_apart(free, occupied)
         raise BrrtError(
-            f"{fields.where('free_thresh')} {free:g} must be below occupied_thresh {occupied:g}"
+            f"{fields.where('free_thresh')} {texts[0]} must be below occupied_thresh {texts[1]}"
         )
     return occupied, free
 
