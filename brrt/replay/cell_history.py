@@ -76,19 +76,13 @@ class CellHistory:
 
 
 class CellTrace:
-    """A fold that keeps the events that concern a cell.
-
-    Args:
-        cell: The cell's number.
-        manifest: The run's.
-    """
+    """A fold that keeps the events that concern a cell."""
 
     def __init__(self, cell: int, manifest: Manifest) -> None:
         self._cell, self._goal = cell, np.array(manifest.goal)
-        self._kept: dict[Kind, list[Table]] = {
-            kind: [] for kind in (Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE)
-        }
-        self._reasons: Counter[str] = Counter()
+        kinds = Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE
+        self._kept: dict[Kind, list[Table]] = {kind: [] for kind in kinds}
+        self._reasons: Counter[int] = Counter()
         self._seen = -1
 
     def write(self, events: Events) -> None:
@@ -98,8 +92,7 @@ class CellTrace:
             parts.append(table[table["cell"] == self._cell])
             self._seen = max(self._seen, int(table["cell"].max(initial=-1)))
         rejects = events[Kind.REJECT]
-        for reason in rejects["reason"][rejects["node"] == self._cell].tolist():
-            self._reasons[Reason.label_of(reason)] += 1
+        self._reasons.update(rejects["reason"][rejects["node"] == self._cell].tolist())
 
     @property
     def has_cells(self) -> bool:
@@ -108,9 +101,6 @@ class CellTrace:
 
     def history(self, robot: Robot) -> CellHistory:
         """Return the history.
-
-        Args:
-            robot: The robot, resolved in the world.
 
         Raises:
             BrrtError: The cell was neither expanded nor entered.
@@ -136,5 +126,5 @@ class CellTrace:
                 for row, old in zip(raised, before, strict=False)
             ],
             visits=[When.of(row) for row in moves],
-            rejects=dict(self._reasons.most_common()),
+            rejects={Reason.label_of(reason): n for reason, n in self._reasons.most_common()},
         )

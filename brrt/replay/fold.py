@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Protocol
 
-from brrt.events import Events, Instant
+from brrt.events import Events
 from brrt.recording import Limits
 
 
@@ -15,12 +15,7 @@ class Fold(Protocol):
 
 
 def until(batches: Iterable[Events], limits: Limits) -> Iterator[Events]:
-    """Yield the events up to an instant; no batch after the one with the instant is read.
-
-    Args:
-        batches: A log.
-        limits: The instant, as `Events.until` takes it; the end of the log if it is empty.
-    """
+    """Yield the events up to an instant; no batch after the one with the instant is read."""
     for batch in batches:
         part = batch.until(**limits) if limits else batch
         yield part
@@ -28,21 +23,9 @@ def until(batches: Iterable[Events], limits: Limits) -> Iterator[Events]:
             return
 
 
-def feed(
-    batches: Iterable[Events], folds: Iterable[Fold], limits: Limits | None = None
-) -> tuple[int, Instant] | None:
-    """Pass the events up to an instant to folds, in one pass; see `until`.
-
-    Returns:
-        The number of events and the last one's instant; None if the limits leave out any.
-    """
+def feed(batches: Iterable[Events], folds: Iterable[Fold], limits: Limits | None = None) -> None:
+    """Pass the events up to an instant to folds, in one pass."""
     folds = list(folds)
-    count, last = 0, Instant(0, 0)
-    for batch in batches:
-        part = batch.until(**limits) if limits else batch
+    for part in until(batches, limits or {}):
         for fold in folds:
             fold.write(part)
-        if len(part) < len(batch):
-            return None
-        count, last = count + len(batch), batch.last if len(batch) else last
-    return count, last

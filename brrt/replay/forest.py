@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,10 @@ from brrt.replay.tree_fold import (
     NO_PARENT,
     VALID,
     Distance,
+    Floats,
+    Ints,
     TreeChanges,
+    Verdicts,
     fold_costs,
     of_tree,
     sum_lengths,
@@ -55,12 +57,8 @@ class Tree:
         """Edges from the root to the deepest node."""
         return depth_of(self.parent)
 
-    def path_to(self, node: int) -> NDArray[np.float64]:
-        """Configurations from the root to a node, shape (m, dof).
-
-        Raises:
-            LogError: The parents do not lead to a root.
-        """
+    def path_to(self, node: int) -> Floats:
+        """Configurations from the root to a node, shape (m, dof); see `lineage`."""
         return self.q[self.lineage(node)]
 
     def lineage(self, node: int) -> list[int]:
@@ -100,14 +98,12 @@ class Tree:
         raise LogError(f"node {node} is its own ancestor")
 
 
-def leaves_of(parent: NDArray[np.signedinteger[Any]]) -> int:
+def leaves_of(parent: Ints) -> int:
     """Count the nodes without children; `parent` has shape (n,)."""
-    has_child = np.zeros(len(parent), np.bool_)
-    has_child[parent[parent >= 0]] = True
-    return len(parent) - int(has_child.sum())
+    return int((np.bincount(parent[parent >= 0], minlength=len(parent)) == 0).sum())
 
 
-def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
+def depth_of(parent: Ints) -> int:
     """Count the edges from the root to the deepest node; `parent` has shape (n,).
 
     Raises:
@@ -118,7 +114,7 @@ def depth_of(parent: NDArray[np.signedinteger[Any]]) -> int:
     return int(depths(parent).max(initial=0))
 
 
-def depths(parent: NDArray[np.signedinteger[Any]]) -> NDArray[np.int64]:
+def depths(parent: Ints) -> NDArray[np.int64]:
     """Count the edges from the root to each node, shape (n,).
 
     Raises:
@@ -137,7 +133,7 @@ def depths(parent: NDArray[np.signedinteger[Any]]) -> NDArray[np.int64]:
     return steps
 
 
-def _depth_in_order(parent: NDArray[np.signedinteger[Any]]) -> int:
+def _depth_in_order(parent: Ints) -> int:
     """Do the same where parents precede their children, in blocks that fit into a cache."""
     depth = np.empty(len(parent), np.int32)
     for first in range(0, len(parent), _BLOCK):
@@ -150,8 +146,7 @@ def _depth_in_order(parent: NDArray[np.signedinteger[Any]]) -> int:
             steps += steps[top]
             top = top[top]
         above = outside[top]
-        here = np.where(above >= 0, depth[above] + 1, 0) + steps
-        depth[first : first + _BLOCK] = here
+        depth[first : first + _BLOCK] = np.where(above >= 0, depth[above] + 1, 0) + steps
     return int(depth.max(initial=0))
 
 
@@ -185,9 +180,7 @@ def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tre
     return trees
 
 
-def _after(
-    changes: TreeChanges, q: NDArray[np.float64], distance: Distance | None
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+def _after(changes: TreeChanges, q: Floats, distance: Distance | None) -> tuple[Ints, Floats]:
     """Return the parents and costs after all changes, shape (n,) each."""
     if distance is not None:
         check_verdicts(changes, changes.existence())
@@ -202,12 +195,7 @@ def _after(
     return found.parent, found.cost
 
 
-def final_costs(
-    parent: NDArray[np.int32],
-    stated: NDArray[np.float64],
-    q: NDArray[np.float64],
-    distance: Distance,
-) -> NDArray[np.float64]:
+def final_costs(parent: Ints, stated: Floats, q: Floats, distance: Distance) -> Floats:
     """Measure the costs-to-come of a tree's nodes, shape (n,).
 
     Args:
@@ -227,11 +215,7 @@ def final_costs(
 
 
 def check_numbers(rows: Table, tree: int, first: int) -> None:
-    """Check that the edges of a tree number its nodes on from `first`.
-
-    Raises:
-        LogError: They do not.
-    """
+    """Raise `LogError` unless the edges of a tree number its nodes on from `first`."""
     wrong = np.flatnonzero(rows["node"] != np.arange(first, first + len(rows)))
     if len(wrong):
         at = int(wrong[0])
@@ -241,12 +225,8 @@ def check_numbers(rows: Table, tree: int, first: int) -> None:
         )
 
 
-def check_verdicts(changes: TreeChanges, verdict: NDArray[np.uint8]) -> None:
-    """Check that all changes of a tree can be made.
-
-    Raises:
-        LogError: One cannot; the message names the first.
-    """
+def check_verdicts(changes: TreeChanges, verdict: Verdicts) -> None:
+    """Raise `LogError` unless all changes of a tree can be made; it names the first that cannot."""
     wrong = np.flatnonzero(verdict != VALID)
     if len(wrong):
         i = int(wrong[0])

@@ -1,7 +1,6 @@
 """The metrics of a run: one fold over its events, live or from a file."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,28 +17,18 @@ Path = tuple[float, NDArray[np.float64]]
 """Cost and waypoints."""
 
 
-def _phase(event: Any) -> tuple[Phase, Status]:
-    try:
-        return Phase(int(event["name"])), Status(int(event["status"]))
-    except ValueError as error:
-        raise BrrtError(
-            f"event {event['seq']:,}: {error}; a phase is one of events.Phase"
-        ) from None
-
-
 class Metrics:
     """A fold of constant memory.
 
-    Args:
-        manifest: The run's manifest.
+    Attributes:
+        counts: Number of events of each kind, 0 included.
+        iterations: The last event's iteration.
     """
 
     def __init__(self, manifest: Manifest) -> None:
-        self._manifest = manifest
-        self._events = 0
-        self._counts = dict.fromkeys(Kind, 0)
-        self._iterations = 0
-        self._last_t = 0
+        self._scenario = manifest.scenario
+        self.counts = dict.fromkeys(Kind, 0)
+        self.iterations = self._last_t = 0
         self._raw: Path | None = None
         self._smoothed: Path | None = None
         self._first: tuple[Instant, float] | None = None
@@ -54,15 +43,18 @@ class Metrics:
             BrrtError: A phase or a status is unknown.
         """
         for kind, count in events.counts.items():
-            self._events += count
-            self._counts[kind] += count
+            self.counts[kind] += count
         last = events.last
-        self._iterations = max(self._iterations, last.iteration)
+        self.iterations = max(self.iterations, last.iteration)
         self._last_t = max(self._last_t, last.t)
         for event in events[Kind.PATH]:
             self._take_path(event, events.dof)
         for event in events[Kind.PHASE]:
-            phase, status = _phase(event)
+            try:
+                phase, status = Phase(int(event["name"])), Status(int(event["status"]))
+            except ValueError as error:
+                why = f"{error}; a phase is one of events.Phase"
+                raise BrrtError(f"event {event['seq']:,}: {why}") from None
             if status is Status.BEGIN:
                 self._began[phase] = int(event["t"])
             else:
@@ -90,16 +82,6 @@ class Metrics:
         return self._smoothed or self._raw
 
     @property
-    def counts(self) -> Mapping[Kind, int]:
-        """Number of events of each kind, 0 included."""
-        return self._counts
-
-    @property
-    def iterations(self) -> int:
-        """The last event's iteration."""
-        return self._iterations
-
-    @property
     def status(self) -> str:
         """How planning ended; "running" if the log ends before."""
         ended = self._ended.get(Phase.PLAN)
@@ -124,8 +106,7 @@ class Metrics:
         the planner found. `moves` counts the last trial's moves if the robot moved, otherwise the
         motions of the final path (waypoints - 1).
         """
-        scenario = self._manifest.scenario
-        raw, smoothed = self._raw, self._smoothed
+        scenario, raw, smoothed = self._scenario, self._raw, self._smoothed
         final = self.best_path
         return {
             "planner": scenario.planner,
@@ -134,10 +115,10 @@ class Metrics:
             "seed": scenario.seed,
             "solved": self.solved,
             "status": self.status,
-            "iterations": self._iterations,
-            "events": self._events,
-            "nodes": self._counts[Kind.EDGE],
-            **{count.key: self._counts[kind] for kind, count in COUNTS.items() if count.key},
+            "iterations": self.iterations,
+            "events": sum(self.counts.values()),
+            "nodes": self.counts[Kind.EDGE],
+            **{count.key: self.counts[kind] for kind, count in COUNTS.items() if count.key},
             "path_cost": _finite(raw and raw[0]),
             "path": None if raw is None else raw[1].tolist(),
             "smoothed_cost": _finite(smoothed and smoothed[0]),
@@ -192,8 +173,7 @@ class _Moves:
     def as_dict(self) -> dict[str, Any]:
         """Return the metrics; None for each without moves."""
         if self._last_t is None:
-            names = ("max_move_time_s", "deadline_misses", "charged_moves", "stays")
-            return dict.fromkeys(names)
+            return dict.fromkeys(("max_move_time_s", "deadline_misses", "charged_moves", "stays"))
         return {
             "moves": self._count,
             "max_move_time_s": self._longest / 1e9,

@@ -1,7 +1,7 @@
 """The history of one node of a tree: a fold over the events that concern it."""
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -52,6 +52,12 @@ class Draw:
     tree: int
     source: str
     q: list[float]
+
+    @classmethod
+    def of(cls, row: Any) -> Self:
+        """Return the sample in a row of a table."""
+        source = Source.label_of(int(row["source"]))
+        return cls(When.of(row), int(row["tree"]), source, row["q"].tolist())
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,20 +152,14 @@ class NodeHistory:
 
 
 class NodeTrace:
-    """A fold that keeps the events that concern a node.
-
-    Args:
-        node: The node's number.
-        tree: Number of its tree.
-        dof: Numbers in a configuration.
-    """
+    """A fold that keeps the events that concern a node."""
 
     def __init__(self, node: int, tree: int, dof: int) -> None:
         self._node, self._tree, self._dof = node, tree, dof
         self._structure: list[Events] = []
         self._rejects: list[Table] = []
         self._drawn: Table | None = None
-        self._sample: Any = None
+        self._sample: Draw | None = None
         self._paths: dict[str, Floats] = {}
         self._trees: set[int] = set()
 
@@ -181,7 +181,7 @@ class NodeTrace:
             before = samples[samples["seq"] < added["seq"][0]]
             last = before[-1:] if len(before) else self._drawn
             if last is not None and last["iteration"][0] == added["iteration"][0]:
-                self._sample = last[0]
+                self._sample = Draw.of(last[0])
         self._drawn = samples[-1:].copy() if len(samples) else self._drawn
         for path in events[Kind.PATH]:
             stage = "smoothed" if path["stage"] == Stage.SMOOTHED else "raw"
@@ -194,10 +194,6 @@ class NodeTrace:
 
     def history(self, robot: Robot, world: World) -> NodeHistory:
         """Return the history.
-
-        Args:
-            robot: The robot, resolved in the world.
-            world: The world.
 
         Raises:
             BrrtError: The node does not exist.
@@ -216,8 +212,7 @@ class NodeTrace:
                 f"node {node:,} does not exist at this instant: {tree_name(self._tree)} has the "
                 f"nodes 0 to {len(tree) - 1:,}"
             )
-        edge = events[Kind.EDGE][node]
-        q = tree.q[node]
+        edge, q = events[Kind.EDGE][node], tree.q[node]
         costs = self._cost_changes(events, tree, robot)
         return NodeHistory(
             node=node,
@@ -226,7 +221,7 @@ class NodeTrace:
             born=When.of(edge),
             born_parent=int(edge["parent"]),
             born_cost=float(edge["cost"]),
-            sample=self._draw(),
+            sample=self._sample,
             rewires=[change for change in costs if change.node == node],
             follows=[change for change in costs if change.node != node],
             parent=int(tree.parent[node]),
@@ -237,13 +232,6 @@ class NodeTrace:
             paths=self._waypoints(q),
             rejects=self._rejections(q, robot, world),
         )
-
-    def _draw(self) -> Draw | None:
-        row = self._sample
-        if row is None:
-            return None
-        number = int(row["source"])
-        return Draw(When.of(row), int(row["tree"]), Source.label_of(number), row["q"].tolist())
 
     def _cost_changes(self, events: Events, tree: Tree, robot: Robot) -> list[CostChange]:
         """Return the node's own rewires, and those of ancestors that changed its cost."""
@@ -261,38 +249,29 @@ class NodeTrace:
             row = rewires[np.searchsorted(rewires["seq"], changes.seq[i])]
             old = int(changes.parent[history.latest(row["node"][None], np.array([i]))[0]])
             if cost[0] != before or row["node"] == self._node:
-                parents = old, int(row["parent"])
-                both = before, float(cost[0])
-                found.append(CostChange(When.of(row), int(row["node"]), *parents, *both))
+                moved, parent, after = int(row["node"]), int(row["parent"]), float(cost[0])
+                found.append(CostChange(When.of(row), moved, old, parent, before, after))
         return found
 
     def _waypoints(self, q: Floats) -> dict[str, int]:
-        found = {}
-        for stage, path in self._paths.items():
-            at = np.flatnonzero((path == q).all(axis=1))
-            if len(at):
-                found[stage] = int(at[0])
-        return found
+        at = {stage: (path == q).all(axis=1) for stage, path in self._paths.items()}
+        return {stage: int(here.argmax()) for stage, here in at.items() if here.any()}
 
     def _rejections(self, q: Floats, robot: Robot, world: World) -> list[Rejection]:
         rows = np.concatenate(self._rejects)
         blocked = np.flatnonzero(np.isin(rows["reason"], [int(reason) for reason in _BLOCKED]))
-        names: dict[int, str] = {}
+        found = [
+            Rejection(When.of(row), Reason.label_of(int(row["reason"])), row["q"].tolist(), None)
+            for row in rows
+        ]
         if len(blocked):
             obstacles = Obstacles(world)
             ends = np.asarray(rows["q"][blocked])
             hits = first_hits(obstacles, robot, np.broadcast_to(q, ends.shape), ends)
-            found = zip(blocked.tolist(), hits.tolist(), strict=True)
-            names = {i: obstacles.name(hit) for i, hit in found if hit >= 0}
-        return [
-            Rejection(
-                When.of(row),
-                Reason.label_of(int(row["reason"])),
-                row["q"].tolist(),
-                names.get(i),
-            )
-            for i, row in enumerate(rows)
-        ]
+            for i, hit in zip(blocked.tolist(), hits.tolist(), strict=True):
+                if hit >= 0:
+                    found[i] = replace(found[i], hit=obstacles.name(hit))
+        return found
 
 
 def tree_name(tree: int) -> str:

@@ -6,14 +6,14 @@ from functools import cached_property
 
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind
-from brrt.recording import Limits, Memory, Recording, instant
+from brrt.recording import Limits, Recording, instant
 from brrt.replay.cell_history import CellHistory, CellTrace
 from brrt.replay.fold import Fold, feed, until
 from brrt.replay.forest import Tree, forest
 from brrt.replay.metrics import Metrics, Path
 from brrt.replay.node_history import NodeHistory, NodeTrace
 
-_NAMES = {"t": "time", "seq": "event", "iteration": "iteration"}
+_NAMES = {"seq": "event", "iteration": "iteration"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,15 +31,15 @@ class Snapshot:
     def __repr__(self) -> str:
         scenario = self.recording.manifest.scenario
         run = f"{scenario.planner} in {scenario.world}, seed {scenario.seed}"
-        ends = [f"{_NAMES[name]} {_shown(name, value)}" for name, value in self.limits.items()]
-        return f"<Snapshot of {run}, after {ends[0] if ends else 'its last event'}>"
+        end = "its last event"
+        for name, value in self.limits.items():
+            end = f"time {value / 1e9:g} s" if name == "t" else f"{_NAMES[name]} {value:,}"
+        return f"<Snapshot of {run}, after {end}>"
 
     @cached_property
     def events(self) -> Events:
         """All events up to the instant."""
-        kept = Memory()
-        self.feed(kept)
-        return Events.concat(self.recording.manifest.dof, kept.batches)
+        return Events.concat(self.recording.manifest.dof, self._batches())
 
     @cached_property
     def forest(self) -> Mapping[int, Tree]:
@@ -48,11 +48,8 @@ class Snapshot:
         Raises:
             RecordingError: The events do not make trees.
         """
-        edges = [
-            Events(batch.dof, {kind: batch[kind] for kind in (Kind.EDGE, Kind.REWIRE)})
-            for batch in self._batches()
-        ]
-        run = self.recording
+        run, kinds = self.recording, (Kind.EDGE, Kind.REWIRE)
+        edges = (Events(each.dof, {kind: each[kind] for kind in kinds}) for each in self._batches())
         return forest(Events.concat(run.manifest.dof, edges), run.robot().distance)
 
     @cached_property
@@ -69,10 +66,6 @@ class Snapshot:
 
     def node(self, node: int, tree: int = 0) -> NodeHistory | CellHistory:
         """Return the history of a node, or of a cell if the planner searches a lattice.
-
-        Args:
-            node: Its number.
-            tree: Number of its tree.
 
         Raises:
             BrrtError: There is no such node.
@@ -95,10 +88,6 @@ class Snapshot:
         """Yield the events up to the instant; from memory once `events` was used."""
         known = self.__dict__.get("events")
         yield from until(self.recording.batches(), self.limits) if known is None else [known]
-
-
-def _shown(name: str, value: int) -> str:
-    return f"{value / 1e9:g} s" if name == "t" else f"{value:,}"
 
 
 def snapshot(

@@ -3,11 +3,11 @@
 Times, versions and folders are left out, and numbers are rounded to six digits.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.digits import digits_within, join_numbers
 from brrt.events import COUNTS, FIELDS, Events, Kind, Phase, Stage, Status, Table
@@ -26,22 +26,16 @@ _LEAST_GAIN = 0.01
 
 
 class Transcript:
-    """A fold that writes down what happened, in constant memory.
-
-    Args:
-        manifest: The run's manifest.
-        robot: The robot, which measures the distance to the goal.
-        world: The world, whose bounds decide how many digits places have.
-    """
+    """A fold that writes down what happened, in constant memory."""
 
     def __init__(self, manifest: Manifest, robot: Robot, world: World) -> None:
         self._manifest, self._robot = manifest, robot
         self._digits = digits_within(*robot.bounds(world))
         self._lines: list[Line] = []
-        self._counts: dict[tuple[Kind, int], int] = {}
-        self._path: Any = None
+        self._counts: Counter[tuple[Kind, int]] = Counter()
+        self._path: float | None = None
         self._best = np.inf
-        self._skipped: Line | None = None
+        self._skipped: list[Line] = []  # the best path so far if it was left out
         self._nearest = (np.inf, -1, 0)
         self._iteration = 0
 
@@ -64,7 +58,7 @@ class Transcript:
     def lines(self) -> Iterator[str]:
         """Yield the transcript so far, line by line."""
         yield from self._head()
-        lines = [*self._lines, *self._newest(), *self._counted()]
+        lines = [*self._lines, *self._skipped, *self._counted()]
         width = max((len(f"{number:,}") for number, _ in lines), default=1)
         before = None
         for number, text in lines:
@@ -74,7 +68,7 @@ class Transcript:
 
     def _head(self) -> Iterator[str]:
         scenario = self._manifest.scenario
-        world, robot = (_last_name(spec) for spec in (scenario.world, scenario.robot))
+        world, robot = (spec.rsplit("/", 1)[-1] for spec in (scenario.world, scenario.robot))
         yield f"{scenario.planner} · {robot} · {world} · seed {scenario.seed}"
         settings = planner_settings(self._manifest)[-1]
         if settings:
@@ -93,8 +87,7 @@ class Transcript:
                 continue
             values = np.zeros(len(part), int) if choice is None else part[choice].astype(int)
             for value, count in zip(*np.unique(values, return_counts=True), strict=True):
-                key = (kind, int(value))
-                self._counts[key] = self._counts.get(key, 0) + int(count)
+                self._counts[kind, int(value)] += int(count)
             if kind is Kind.EDGE:
                 self._approach(part)
 
@@ -102,8 +95,7 @@ class Transcript:
         """Keep the node of the start's tree that is nearest to the goal."""
         mine = edges[edges["tree"] == 0]
         if len(mine):
-            goal = np.array(self._manifest.goal)
-            far: NDArray[np.float64] = self._robot.distance(mine["q"], goal)
+            far = self._robot.distance(mine["q"], np.array(self._manifest.goal))
             best = int(far.argmin())
             here = (float(far[best]), int(mine["node"][best]), int(mine["iteration"][best]))
             self._nearest = min(self._nearest, here, key=lambda found: found[0])
@@ -114,41 +106,32 @@ class Transcript:
         if status is Status.BEGIN:
             self._lines.append((iteration, f"{phase.label} begins"))
             return
-        self._lines += self._newest()
-        self._lines += [(iteration, text) for _, text in self._counted()]
+        self._lines += self._skipped
+        texts = [text for _, text in self._counted()]
         self._counts.clear()
-        self._skipped = None
-        self._lines.append((iteration, f"{phase.label} ends: {status.label}"))
+        self._skipped = []
+        texts.append(f"{phase.label} ends: {status.label}")
         if phase is Phase.PLAN and self._path is None:
-            self._lines += [(iteration, text) for text in self._failure()]
-
-    def _failure(self) -> Iterator[str]:
-        far, node, iteration = self._nearest
-        yield "no path"
-        if np.isfinite(far):
-            yield (
-                f"nearest to the goal: node {node:,} of iteration {iteration:,}, "
-                f"{far:.6g} away from it"
-            )
+            texts.append("no path")
+            far, node, born = self._nearest
+            if np.isfinite(far):
+                where = f"node {node:,} of iteration {born:,}, {far:.6g} away from it"
+                texts.append(f"nearest to the goal: {where}")
+        self._lines += [(iteration, text) for text in texts]
 
     def _add_path(self, event: Any) -> None:
         stage, cost = Stage(int(event["stage"])), float(event["cost"])
-        waypoints = len(event["waypoints"])
         name = "first path" if self._path is None else f"{stage.label} path"
-        text = f"{name}: cost {cost:.6g}, {waypoints} waypoints"
+        text = f"{name}: cost {cost:.6g}, {len(event['waypoints'])} waypoints"
         if self._path is not None and self._path > 0:
             text += f", {100 * (1 - cost / self._path):.2f} % less than the first"
         line = (int(event["iteration"]), text)
         self._path = cost if self._path is None else self._path
         if stage is Stage.IMPROVED and cost > (1 - _LEAST_GAIN) * self._best:
-            self._skipped = line
+            self._skipped = [line]
             return
-        self._best, self._skipped = cost, None
+        self._best, self._skipped = cost, []
         self._lines.append(line)
-
-    def _newest(self) -> list[Line]:
-        """Return the best path so far if it was left out."""
-        return [] if self._skipped is None else [self._skipped]
 
     def _counted(self) -> Iterator[Line]:
         """Yield the counts since the phase began."""
@@ -171,11 +154,6 @@ def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
     choices = next(field.choices for field in FIELDS[kind] if field.name == choice)
     label: Callable[[int], str] = choices.label_of if choices else str
     return ", ".join(f"{n:,} {label(value)}" for value, n in found.items())
-
-
-def _last_name(spec: str) -> str:
-    """Return a file's name without its folders."""
-    return spec.rsplit("/", 1)[-1]
 
 
 def _text(value: Any) -> str:

@@ -74,12 +74,7 @@ class TreeChanges(NamedTuple):
         return cls(seq[order], node, parent, stated, order < len(edges))
 
     def lengths(self, q: Floats, distance: Distance) -> Floats:
-        """Measure the edge that each change makes, shape (m,); nan where an end does not exist.
-
-        Args:
-            q: Configurations of the nodes, shape (n, dof).
-            distance: The robot's metric.
-        """
+        """Measure the edge that each change makes, shape (m,); nan where an end does not exist."""
         n, length = len(q), np.full(len(self.seq), np.nan)
         for first in range(0, len(length), _CHUNK):
             chunk = slice(first, first + _CHUNK)
@@ -89,11 +84,7 @@ class TreeChanges(NamedTuple):
         return length
 
     def existence(self, first: int = 0) -> Verdicts:
-        """Return the verdict on each change, apart from cycles, shape (m,).
-
-        Args:
-            first: Nodes that exist before.
-        """
+        """Return the verdict on each change apart from cycles, shape (m,); `first` nodes exist."""
         exist = first + np.cumsum(self.joins)
         no_parent = (self.parent >= exist) | (self.joins & (self.parent == self.node))
         no_parent |= ~self.joins & (self.parent < 0)
@@ -204,14 +195,7 @@ def sum_lengths(parent: Ints, length: Floats, cost: Floats, order: Ints | None =
 
 
 class _Tree:
-    """A tree at one moment.
-
-    Args:
-        cost: Costs of the nodes as long as they have no parent, shape (n,).
-
-    Attributes:
-        parent: Ints, -1 where there is none yet.
-    """
+    """A tree at one moment; nodes without a parent, -1, have the given costs, shape (n,)."""
 
     def __init__(self, cost: Floats) -> None:
         nodes = len(cost)

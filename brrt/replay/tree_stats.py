@@ -30,11 +30,7 @@ class TreeFigures(NamedTuple):
 
 
 class TreeStats:
-    """A sink that keeps what the table needs: 12 bytes a node, and its configuration.
-
-    Args:
-        distance: The robot's metric, on rows of configurations.
-    """
+    """A sink that keeps what the table needs: 12 bytes a node, and its configuration."""
 
     def __init__(self, distance: Distance) -> None:
         self._distance = distance
