@@ -15,12 +15,7 @@ from brrt.replay.snapshot import Snapshot
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The facts of a run and advice; as text it is what `brrt explain` prints.
-
-    Attributes:
-        facts: The facts.
-        advice: What to try, the most promising first.
-    """
+    """The facts of a run, and advice, the most promising first; see `brrt explain`."""
 
     facts: Facts
     advice: list[Advice]
@@ -36,8 +31,8 @@ class Explanation:
     def __str__(self) -> str:
         """Return what `brrt explain` prints."""
         lines = self.table()
-        for i, advice in enumerate(self.advice):
-            lines += ["", *advice.reason(i + 1), *advice.command_lines()]
+        for i, advice in enumerate(self.advice, 1):
+            lines += ["", *advice.reason(i), *advice.command_lines()]
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:

@@ -6,15 +6,7 @@ No rule goes beyond its facts.
 from collections.abc import Callable, Mapping
 
 from brrt.explanation import unsolved
-from brrt.explanation.commands import (
-    Advice,
-    extend,
-    file_of,
-    replan,
-    resume,
-    rounded,
-    show,
-)
+from brrt.explanation.commands import Advice, extend, file_of, replan, resume, rounded, show
 from brrt.explanation.diagnosis import ended_by_budget, fitting_step, is_stuck
 from brrt.explanation.facts import Facts
 from brrt.explanation.report import place
@@ -28,8 +20,7 @@ Rule = Callable[[Facts], Advice | None]
 
 def advise(facts: Facts) -> list[Advice]:
     """Return what follows from the facts, the most promising first; `MOST` at most."""
-    found: list[Advice] = []
-    excluded: set[Rule] = set()
+    found, excluded = list[Advice](), set[Rule]()
     rules = _SOLVED if facts.figures["solved"] else _UNSOLVED
     if not facts.contract.planner.registered:  # no command plans such a run
         rules = _ANY
@@ -40,7 +31,7 @@ def advise(facts: Facts) -> list[Advice]:
             excluded.update(_EXCLUDES.get(rule, ()))
     if not found and rules is _UNSOLVED:
         found += filter(None, [unsolved.out_of_budget(facts)])
-    return [each.numbered(i + 1, facts.file) for i, each in enumerate(found[:MOST])]
+    return [each.numbered(i, facts.file) for i, each in enumerate(found[:MOST], 1)]
 
 
 def unfinished(f: Facts) -> Advice | None:
@@ -108,9 +99,7 @@ def half_the_budget(f: Facts) -> Advice | None:
 def informed(f: Facts) -> Advice | None:
     """After the first path, samples came from where no better path can lead."""
     p, draws = f.progress, f.contract.draws
-    if p is None or draws is None or draws.informed or not f.contract.improves:
-        return None
-    if f.contract.stops:
+    if p is None or draws is None or draws.informed or not f.contract.improves or f.contract.stops:
         return None
     after = 1 - p.first / max(f.figures["iterations"], 1)
     if after < 0.5 or f.approach is None or p.best_cost < 1.02 * f.approach.start:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Table
+from brrt.events import Events, Kind
 from brrt.robots import Robot
 
 Floats = NDArray[np.float64]
@@ -14,12 +14,7 @@ Flags = NDArray[np.bool_]
 
 
 class CellSummary:
-    """A fold over the events of cells; memory grows with the cells, not with the moves.
-
-    Args:
-        robot: The robot, which measures the distance to the goal.
-        goal: The goal, shape (dof,).
-    """
+    """A fold over the events of cells; memory grows with the cells, not with the moves."""
 
     def __init__(self, robot: Robot, goal: Floats) -> None:
         self._robot, self._goal = robot, goal
@@ -56,27 +51,19 @@ class CellSummary:
             setattr(self, name, np.concatenate([old, np.zeros((more, *old.shape[1:]), old.dtype)]))
 
     @property
-    def known(self) -> Flags:
-        """Whether each cell was expanded, shape (n,)."""
-        return self._expansions > 0
-
-    @property
     def q(self) -> Floats:
         """Configurations of the expanded cells, shape (m, dof)."""
-        return self._q[self.known]
+        return self._q[self._expansions > 0]
 
-    def origins(self, rejects: Table) -> Floats:
-        """Return where rejected motions began, shape (n, dof); nan for cells never expanded."""
-        q = np.full((len(rejects), self._q.shape[1]), np.nan)
-        cell = np.asarray(rejects["node"], np.int64)
-        exists = (cell >= 0) & (cell < len(self._expansions))
-        exists[exists] = self.known[cell[exists]]
-        q[exists] = self._q[cell[exists]]
-        return q
+    def find(self, cell: Ints) -> tuple[Floats, Flags]:
+        """Return the configurations of cells that were expanded, shape (m, dof), and which were."""
+        known = (cell >= 0) & (cell < len(self._expansions))
+        known[known] = self._expansions[cell[known]] > 0
+        return self._q[cell[known]], known
 
     def as_dict(self) -> dict[str, Any]:
         """Return the sums, the most visited cell and the one whose estimate rose most."""
-        known = self.known
+        known = self._expansions > 0
         if not known.any():
             return {}
         q, visits, estimate = self._q[known], self._visits[known], self._estimate[known]

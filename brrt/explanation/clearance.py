@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,31 +78,18 @@ class Clearance:
 
 
 class ClearanceSearch:
-    """Searches for the widest path from start to goal.
-
-    Args:
-        world: The world.
-        robot: The robot, resolved in it.
-        summary: The run's log, summed up.
-    """
+    """Searches for the widest path from start to goal, and compares a run with it."""
 
     def __init__(self, world: World, robot: Robot, summary: RunSummary) -> None:
         self._world, self._robot, self._summary = world, robot, summary
         # The reference point of a body may lie outside of it; the middle of a disc inside does not.
-        parts = robot.parts if isinstance(robot, Polygon) else ()
-        discs = [inscribed(part) for part in parts]
-        none: tuple[Floats | None, float] = None, 0.0
-        self._middle, radius = max(discs, key=lambda disc: disc[1], default=none)
+        self._middle, radius = None, 0.0
+        if isinstance(robot, Polygon):
+            self._middle, radius = max(map(inscribed, robot.parts), key=itemgetter(1))
         self._body = 2 * radius
 
     def find(self, start: Floats, goal: Floats, step: float | None) -> Clearance:
-        """Return whether there is a path for a point of the body, and how wide the widest is.
-
-        Args:
-            start: The start, shape (dof,).
-            goal: The goal, shape (dof,).
-            step: The planner's step; None if it has none.
-        """
+        """Return whether there is a path for a point of the body, and how wide the widest is."""
         if self._robot.configuration(self._world.lower) is None:
             return Clearance(None, "not computed: this robot has no position in the world")
         ends = self._points(np.stack([start, goal]))
@@ -115,13 +103,12 @@ class ClearanceSearch:
         if known.connected is not None:
             return Clearance(known.connected, known.reason, body=self._body)
         bound = self._widest(ends)
+        reason = f"cells of {known.cell:.3g} are too coarse to find a path"
         if bound == 0:
             reason = "obstacles without a gap separate start and goal"
-            return Clearance(False, reason, None, 0.0, self._body)
-        reason = f"cells of {known.cell:.3g} are too coarse to find a path"
-        if bound is not None:
+        elif bound is not None:
             reason += f"; every path is at most {at_most(bound)} wide"
-        return Clearance(None, reason, None, bound, self._body)
+        return Clearance(False if bound == 0 else None, reason, None, bound, self._body)
 
     def _widest(self, ends: Floats) -> float | None:
         """Return an upper bound on the width of every path."""
@@ -145,14 +132,11 @@ class ClearanceSearch:
 
     def _narrow(self, found: Passage, step: float | None) -> Narrow:
         """Compare the run with the narrowest place."""
-        summary, behind, through = self._summary, 0, None
-        for tree in summary.trees[:1]:
-            passed = found.is_beyond(self._points(summary.nodes(tree)))
-            behind = int(passed.sum())
-            through = int(summary.iterations(tree)[passed][0]) if behind else None
+        summary = self._summary
         q = [summary.nodes(tree) for tree in summary.trees] or [summary.cells.q]
-        if not summary.trees:
-            behind = int(found.is_beyond(self._points(q[0])).sum())
+        passed, through = found.is_beyond(self._points(q[0])), None
+        if summary.trees and passed.any():
+            through = int(summary.iterations(summary.trees[0])[passed][0])
         reach = max(float(coarse(self._world).cell.max()), step or 0.0)
         near = int((found.distance(self._points(np.concatenate(q))) <= reach).sum())
         path, crossed = summary.metrics.best_path, None
@@ -164,7 +148,7 @@ class ClearanceSearch:
             high=found.high,
             q=found.place.tolist(),
             parts=bool(found.beyond.any()),
-            behind=behind,
+            behind=int(passed.sum()),
             through=through,
             near=near,
             reach=reach,

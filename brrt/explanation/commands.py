@@ -92,13 +92,7 @@ def file_of(f: Facts) -> str:
 
 
 def show(why: str, *words: str, suffix: str = "") -> Advice:
-    """Advise a command that plans nothing.
-
-    Args:
-        why: The facts that the advice follows from.
-        words: The command after `brrt`.
-        suffix: Suffix of the file that it writes.
-    """
+    """Advise a command that plans nothing; `words` follow after `brrt`."""
     return Advice(why, ("brrt", *words), suffix)
 
 
@@ -110,14 +104,9 @@ def resume(
     params: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Advice:
-    """Advise to continue the recording with other settings.
+    """Advise to continue the recording after an iteration, or after planning, with other settings.
 
-    Args:
-        f: The facts.
-        why: Those that the advice follows from.
-        iteration: The last iteration that both runs share; by default the end of planning.
-        params: Settings of the planner that change.
-        settings: Fields of the scenario that change.
+    `params` are settings of the planner that change, `settings` fields of the scenario.
     """
     words = ["brrt", "plan", "--from", file_of(f)]
     words += [] if iteration is None else ["--at-iteration", str(iteration)]
@@ -138,13 +127,8 @@ def replan(
 ) -> Advice:
     """Advise to plan from the start with changes; for a branch, from where it branched.
 
-    Args:
-        f: The facts.
-        why: Those that the advice follows from.
-        times: The multiple of the budget that is advised if the budget ended the run.
-        planner: Another planner; `params` are then all that is set.
-        params: Settings of the planner that change.
-        settings: Fields of the scenario that change; None removes a limit.
+    A budget that ended the run is multiplied by `times`. For another planner, `params` are all
+    that is set. `settings` are fields of the scenario that change; None removes a limit.
     """
     if times is not None and ended_by_budget(f):
         settings |= _budget(f, round(times), 1)
@@ -168,12 +152,7 @@ def extend(
 ) -> Advice:
     """Advise to continue the recording with a multiple of the budget that ended it.
 
-    Args:
-        f: The facts.
-        why: Those that the advice follows from.
-        times: The multiple.
-        least: Iterations that are advised at least.
-        params: Settings of the planner that change.
+    At least `least` iterations are advised.
     """
     return resume(f, why, params=params, **_budget(f, times, least))
 

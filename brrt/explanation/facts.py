@@ -103,28 +103,19 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What is known of a run.
+    """What is known of a run; facts of a class of their own are described there.
 
     Attributes:
-        manifest: The run's manifest.
         file: The recording's file, as commands name it; empty for a run in memory.
         ended: Whether the facts are those of the recording's end, not of an earlier instant.
         contract: What the planner promises; empty if it is not known.
         sides: Sides of the world's bounds.
         figures: The metrics, as `brrt replay --json` prints them.
-        tenths: The course of the run.
         trees: Numbers of the trees.
         accepted: Extensions that added a node, or first expansions of cells.
         failed: Extensions that added none, or further expansions of cells.
         reasons: Rejections by reason, most frequent first.
-        blockers: The obstacles that blocked extensions.
-        spot: The place with most rejections.
-        goals: Samples of the goal and their outcome.
-        approach: The node or cell nearest to the goal.
         gap: How close two trees came.
-        coverage: How much of the free space was reached.
-        clearance: Whether there is a path, and how wide the widest is.
-        progress: The paths that the planner found.
         cells: Sums over the cells of a lattice search; empty for other planners.
         digits: Significant digits of each coordinate in texts, by the number of coordinates.
     """
@@ -188,11 +179,7 @@ class Facts:
 
 
 def facts(snapshot: Snapshot, file: str) -> Facts:
-    """Compute all facts, in one pass over the events.
-
-    Args:
-        snapshot: The run at an instant.
-        file: The recording's file, as commands name it; empty for a run in memory.
+    """Compute all facts, in one pass over the events; for `file`, see `Facts`.
 
     Raises:
         BrrtError: The manifest does not fit its world.
@@ -205,8 +192,7 @@ def facts(snapshot: Snapshot, file: str) -> Facts:
     start, goal = np.array(manifest.start), np.array(manifest.goal)
     figures = summary.metrics.as_dict()
     last, solved = figures["iterations"], figures["solved"]
-    rejects = summary.rejects.rows()
-    motions = summary.origins(rejects), np.asarray(rejects["q"])
+    motions = summary.motions(summary.rejects)
     contract = contract_of(manifest, world)
     clearance = ClearanceSearch(world, robot, summary).find(start, goal, contract.step)
     return Facts(
@@ -268,20 +254,19 @@ def _goals(summary: RunSummary, places: Places) -> Goals | None:
     blocked = summary.reasons[int(Reason.GOAL_BLOCKED)]
     if not drawn and not blocked:
         return None
-    rows = summary.goal_rejects.rows()
-    blockers = places.blockers(summary.origins(rows), np.asarray(rows["q"]))
+    blockers = places.blockers(*summary.motions(summary.goal_rejects))
     return Goals(drawn, summary.goal_failed, blocked, blockers)
 
 
 def _approach(
     summary: RunSummary, places: Places, goal: Floats, start: float, last: int
 ) -> Approach | None:
-    near = summary.nearest
-    if near is None:
+    if summary.nearest is None:
         return None
-    hit = places.hit(np.array(near.q), goal) if near.far > 0 else None
-    since = (last - near.iteration) / max(last, 1)
-    return Approach(near.far, start, near.q, near.node, near.iteration, since, hit)
+    far, q, node, iteration = summary.nearest
+    hit = places.hit(np.array(q), goal) if far > 0 else None
+    since = (last - iteration) / max(last, 1)
+    return Approach(far, start, q, node, iteration, since, hit)
 
 
 def _reached(summary: RunSummary) -> tuple[Floats, NDArray[np.int64]]:

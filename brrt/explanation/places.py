@@ -97,13 +97,7 @@ class Gap:
 
 
 class Places:
-    """Finds places in the world of a run.
-
-    Args:
-        world: The world.
-        robot: The robot, resolved in it.
-        summary: The run's log, summed up.
-    """
+    """Finds places in the world of a run."""
 
     def __init__(self, world: World, robot: Robot, summary: RunSummary) -> None:
         self._world, self._robot, self._summary = world, robot, summary
@@ -115,13 +109,10 @@ class Places:
         """Name the obstacles that motions hit first, most frequent first.
 
         Args:
-            a: Where the motions begin, shape (n, dof); rows with nan are left out.
+            a: Where the motions begin, shape (n, dof).
             b: Where they end, shape (n, dof).
         """
-        known = np.isfinite(a).all(axis=1)
-        if not known.any():
-            return []
-        hits = first_hits(self._obstacles, self._robot, a[known], b[known])
+        hits = first_hits(self._obstacles, self._robot, a, b)
         found = Counter(hits[hits >= 0].tolist())
         most = found.most_common(_SHOWN)
         return [Blocker(self._name(hit), n / found.total()) for hit, n in most]
@@ -141,10 +132,9 @@ class Places:
 
     def spot(self, a: Floats, b: Floats) -> Spot | None:
         """Return the coarse cell with most of the middles of motions; see `blockers`."""
-        known = np.isfinite(a).all(axis=1)
-        if not known.any():
+        if not len(a):
             return None
-        middles = (self._robot.places(a[known]) + self._robot.places(b[known])) / 2
+        middles = (self._robot.places(a) + self._robot.places(b)) / 2
         lattice = coarse(self._world)
         cell = np.ravel_multi_index(tuple(lattice.index(middles).T), lattice.shape)
         counts = np.bincount(cell, minlength=int(np.prod(lattice.shape)))

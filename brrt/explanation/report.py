@@ -1,6 +1,6 @@
 """The facts in words: rows of a name and a text, for a screen of 80 columns."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import dist
 from textwrap import wrap
 
@@ -80,21 +80,18 @@ def _course(f: Facts) -> Iterator[Row]:
     """Yield the tenths of the run as a table, a column for each."""
     if len(f.tenths) < 2:
         return
-    yield "iteration", _columns([_short(tenth.last) for tenth in f.tenths])
-    for name, values in (
-        ("% new cells" if f.cells else "% accepted", [_percent(t.accepted) for t in f.tenths]),
-        ("us each", [None if t.us is None else f"{t.us:.3g}" for t in f.tenths]),
-        ("to goal", [None if t.nearest is None else f"{t.nearest:.3g}" for t in f.tenths]),
+    yield "iteration", _columns(_short(tenth.last) for tenth in f.tenths)
+    for name, values, digits in (
+        ("% new cells" if f.cells else "% accepted", [t.accepted for t in f.tenths], ".0%"),
+        ("us each", [t.us for t in f.tenths], ".3g"),
+        ("to goal", [t.nearest for t in f.tenths], ".3g"),
     ):
+        texts = ["-" if value is None else f"{value:{digits}}".rstrip("%") for value in values]
         if any(value is not None for value in values):
-            yield name, _columns(["-" if value is None else value for value in values])
+            yield name, _columns(texts)
 
 
-def _percent(part: float | None) -> str | None:
-    return None if part is None else f"{100 * part:.0f}"
-
-
-def _columns(values: list[str]) -> str:
+def _columns(values: Iterable[str]) -> str:
     return "".join(f"{value:>6}" for value in values)
 
 
@@ -198,8 +195,7 @@ def _paths(f: Facts) -> Iterator[Row]:
     if f.approach is not None and f.approach.start > 0:
         straight = f", {p.best_cost / f.approach.start:.3g} times the straight line"
     if p.paths == 1:
-        cost = _number(p.best_cost)
-        yield "path", f"cost {cost}{straight}, found in iteration {p.first:,}"
+        yield "path", f"cost {_number(p.best_cost)}{straight}, found in iteration {p.first:,}"
         return
     costs = [f"{_number(p.first_cost)} in iteration {p.first:,}"]
     costs += [] if p.half_cost is None else [f"{_number(p.half_cost)} after half of the run"]
@@ -231,9 +227,8 @@ def _execution(f: Facts) -> Iterator[Row]:
     if misses:
         stays = counted(figures["stays"], "deadline")
         late = f"{misses:,} missed the deadline of {deadline:g} s, the robot stayed for {stays}"
-    slowest = seconds(figures["max_move_time_s"])
-    moves = counted(figures["moves"], "move")
-    yield "execution", f"{moves}, the slowest planned in {slowest}; {late}"
+    slowest = f"the slowest planned in {seconds(figures['max_move_time_s'])}"
+    yield "execution", f"{counted(figures['moves'], 'move')}, {slowest}; {late}"
 
 
 def late(share: float) -> str:

@@ -1,7 +1,6 @@
 """A log summed up for an explanation, in one pass; memory grows only with the trees."""
 
 from collections import Counter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,12 +62,7 @@ class IterationBins:
 
 
 class ThinnedRejects:
-    """Every k-th rejection, with k doubled whenever twice `most` are exceeded.
-
-    Args:
-        dof: Numbers in a configuration.
-        most: Half of the rows kept at most.
-    """
+    """Every k-th rejection, with k doubled whenever twice `most` are exceeded."""
 
     def __init__(self, dof: int, most: int = MOST) -> None:
         self._most, self._stride, self._seen = most, 1, 0
@@ -91,21 +85,8 @@ class ThinnedRejects:
         return np.concatenate(self._parts)
 
 
-class Nearest(NamedTuple):
-    """The node or cell nearest to the goal: distance, configuration, number, iteration."""
-
-    far: float
-    q: list[float]
-    node: int
-    iteration: int
-
-
 class RunSummary:
     """A fold over a run.
-
-    Args:
-        manifest: The run's manifest.
-        robot: The robot, resolved in the world.
 
     Attributes:
         metrics: The run's metrics.
@@ -115,7 +96,8 @@ class RunSummary:
         goal_rejects: Those of draws of the goal, and of motions to the goal, thinned.
         drawn: Samples by source.
         goal_failed: Draws of the goal that were rejected.
-        nearest: The cell, or the node of the start's tree, nearest to the goal; None without one.
+        nearest: The cell, or the node of the start's tree, nearest to the goal: distance,
+            configuration, number, iteration; None without one.
         paths: Iteration and cost of each path that the planner found, in order.
         cells: The cells of a lattice search.
     """
@@ -128,7 +110,7 @@ class RunSummary:
         self.goal_rejects = ThinnedRejects(self._dof, MOST // 5)
         self.drawn: Counter[int] = Counter()
         self.goal_failed = 0
-        self.nearest: Nearest | None = None
+        self.nearest: tuple[float, list[float], int, int] | None = None
         self.paths: list[tuple[int, float]] = []
         self.cells = CellSummary(robot, self._goal)
         self._nodes: dict[int, list[Floats]] = {}
@@ -169,17 +151,19 @@ class RunSummary:
         """Numbers of the trees."""
         return sorted(self._nodes)
 
-    def origins(self, rejects: Table) -> Floats:
-        """Return where extensions began, shape (n, dof); nan for nodes that do not exist."""
+    def motions(self, rejects: ThinnedRejects) -> tuple[Floats, Floats]:
+        """Return the ends of rejected motions from nodes or cells that exist, shape (n, dof)."""
+        rows = rejects.rows()
+        node, ends = rows["node"], np.asarray(rows["q"])
         if not self._nodes:
-            return self.cells.origins(rejects)
-        q = np.full((len(rejects), self._dof), np.nan)
+            q, known = self.cells.find(node)
+            return q, ends[known]
+        q, known = np.empty_like(ends), np.zeros(len(rows), np.bool_)
         for tree in self.trees:
             nodes = self.nodes(tree)
-            node = rejects["node"]
-            mine = (rejects["tree"] == tree) & (node >= 0) & (node < len(nodes))
-            q[mine] = nodes[node[mine]]
-        return q
+            mine = (rows["tree"] == tree) & (node >= 0) & (node < len(nodes))
+            q[mine], known[mine] = nodes[node[mine]], True
+        return q[known], ends[known]
 
     def _add_expansions(self, events: Events) -> None:
         expanded = events[Kind.EXPAND]
@@ -193,10 +177,9 @@ class RunSummary:
         far = self._robot.distance(table["q"], self._goal)
         self.bins.approach(table, far)
         at = int(far.argmin())
-        if self.nearest is None or far[at] < self.nearest.far:
-            row = table[at]
-            n, iteration = int(row[number]), int(row["iteration"])
-            self.nearest = Nearest(float(far[at]), row["q"].tolist(), n, iteration)
+        if self.nearest is None or far[at] < self.nearest[0]:
+            q, n, iteration = (table[name][at].tolist() for name in ("q", number, "iteration"))
+            self.nearest = float(far[at]), q, n, iteration
 
     def _add_nodes(self, edges: Table) -> None:
         self.bins.count(edges[edges["parent"] >= 0], 0)

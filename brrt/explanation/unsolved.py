@@ -4,15 +4,7 @@ import math
 from typing import Any
 
 from brrt.explanation.clearance import at_least, at_most
-from brrt.explanation.commands import (
-    Advice,
-    extend,
-    file_of,
-    replan,
-    resume,
-    rounded,
-    show,
-)
+from brrt.explanation.commands import Advice, extend, file_of, replan, resume, rounded, show
 from brrt.explanation.diagnosis import (
     ended_by_budget,
     fitting_step,
@@ -72,8 +64,7 @@ def large_cells(f: Facts) -> Advice | None:
     cells = f"cells of {lattice.epsilon:g}"
     if f.narrow is None:
         # Half of the bound on the width, or a quarter of the cells if that is smaller.
-        bound = f.clearance.widest
-        most = math.inf if bound is None else bound / 2
+        most = math.inf if f.clearance.widest is None else f.clearance.widest / 2
         epsilon = rounded(min(lattice.epsilon / 4, most), 2)
         return _finer(f, f"{cells} have no path, and {f.clearance.reason}", epsilon)
     # A straight passage along an axis that is wider than a cell contains a line of the lattice;
@@ -225,7 +216,5 @@ def longer(f: Facts) -> Advice | None:
 
 def out_of_budget(f: Facts) -> Advice | None:
     """The budget ended the run, and no other rule applies."""
-    if not ended_by_budget(f):
-        return None
     why = "the budget ended the run, and no other fact explains why it found no path"
-    return extend(f, why, 10)
+    return extend(f, why, 10) if ended_by_budget(f) else None
