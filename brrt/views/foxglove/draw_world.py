@@ -13,6 +13,7 @@ from brrt.views.foxglove.messages import (
     MARKERS,
     Marker,
     MarkerType,
+    fits,
     marker_array,
     occupancy,
 )
@@ -56,6 +57,8 @@ def outline(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def static_messages(manifest: Manifest, world: World) -> Iterator[tuple[str, str, bytes]]:
     """Yield topic, type and message of everything that never changes."""
+    if world.grid is not None and not fits(world.grid):
+        world = world.without_grid()
     markers = _obstacles_2d(world) if world.dim == 2 else _obstacles_3d(world)
     yield WORLD, MARKERS, marker_array([_bounds(world), *markers])
     if world.grid is not None:

@@ -164,6 +164,13 @@ def marker_array(markers: Sequence[Marker]) -> bytes:
     return bytes(body.data)
 
 
+def fits(grid: Grid) -> bool:
+    """Whether a grid's cells are right to a tenth of one in a message, which has a float32 edge."""
+    with np.errstate(over="ignore"):
+        edge = float(np.float32(grid.resolution))
+    return bool(abs(edge / grid.resolution - 1) * max(grid.cells.shape) < 0.1)
+
+
 def occupancy(grid: Grid, z: float) -> bytes:
     """Return a grid at a height as a message: 100 for blocked cells, 0 for free ones."""
     body = _Body()

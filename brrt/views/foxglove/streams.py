@@ -21,7 +21,6 @@ from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Places = NDArray[np.float32]
 
 _CUBE = {2: 0.84, 3: 0.32}
 """Edge of a cell's cube in edges of a cell, by dimensions; in 3D one sees between the cubes."""
@@ -45,8 +44,6 @@ Stream = Iterator[Message]
 class MarkerStreams:
     """Turns the log of a run into streams of messages, each in the order of time.
 
-    Places are rounded to float32, the precision of the viewers.
-
     Raises:
         LogError: The events contradict each other.
     """
@@ -67,8 +64,8 @@ class MarkerStreams:
         yield self._trace()
         yield self._moves()
 
-    def _places(self, q: Floats) -> Places:
-        return np.ascontiguousarray(self._robot.places(q), np.float32)
+    def _places(self, q: Floats) -> Floats:
+        return np.asarray(self._robot.places(q))
 
     def _tree(self, number: int) -> Stream:
         """Show the edges; the edge of a rewired node goes when its new one comes."""
@@ -181,7 +178,7 @@ class MarkerStreams:
         return mine
 
     def _lines(
-        self, topic: str, t: Ints, keys: Ints, ends: Places, colour: Colour, width: float
+        self, topic: str, t: Ints, keys: Ints, ends: Floats, colour: Colour, width: float
     ) -> Stream:
         points = np.zeros((len(ends), 2, 3))
         points[..., : self._world.dim] = ends

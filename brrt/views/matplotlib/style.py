@@ -42,6 +42,7 @@ _TYPE = {
     "legend.labelspacing": 0.3,
     "axes.formatter.use_mathtext": True,
     "axes.formatter.limits": (-4, 6),
+    "axes.formatter.offset_threshold": 3,  # labels of maps far from the origin would overlap
     "figure.facecolor": "white",
     "axes.facecolor": "white",
     "pdf.fonttype": 42,  # searchable type, which publishers require

@@ -11,22 +11,21 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from brrt.errors import RecordingError
-from brrt.robots import Robot
-from brrt.views.colours import FREE, GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, Colour
+from brrt.views.colours import FREE, GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, TRACE, Colour
+from brrt.views.rerun.frame import Frame
 from brrt.views.rerun.stream import rrd_file, viewer_stream
 from brrt.worlds.free_space import occupied
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
-_GREATEST = 1e30
-"""Greatest coordinate: a viewer multiplies lengths by others in single precision."""
 _CORNERS = 1 / 16, 1 / 4
 """Radii of two thin lines along the edge of a box in 2D, in radii of the others, whose round
 corners leave the box's own unfilled."""
 _LAYERS, _OVERLAP = 5, 1.5
 """Nested lines that fill half of a box in 2D, and their distance in radii: less than 2, so that
 each covers the round corners of the next."""
+_BELOW = {2: 0.02, 3: 0.05}
+"""How far below the bounds the text is that explains the coordinates, as a part of the extent."""
 _PIXELS = 640
 """Pixels along the longer side of the image that fills polygons: about a window's resolution."""
 
@@ -35,14 +34,8 @@ def show_world(world: World, *, path: Path | None = None, view: bool = False) ->
     """Write a world to an .rrd file, or show it in Rerun's viewer, or both.
 
     Raises:
-        BrrtError: The file cannot be written, there is no viewer, or a coordinate is too large for
-            single precision.
+        BrrtError: The file cannot be written, or there is no viewer.
     """
-    if max(np.abs(world.lower).max(), np.abs(world.upper).max()) > _GREATEST:
-        raise RecordingError(
-            f"{world.name}: Rerun draws in single precision, with coordinates up to {_GREATEST:g}; "
-            f"make the world smaller"
-        )
     name = f"world-{hashlib.sha256(world.to_json().encode()).hexdigest()[:16]}"
     layout = rrb.Blueprint(
         world_view(world),
@@ -60,36 +53,41 @@ def show_world(world: World, *, path: Path | None = None, view: bool = False) ->
 
 
 def _log_query(rec: rr.RecordingStream, world: World) -> None:
-    log_world(rec, world)
-    for name, point, colour in (("start", world.start, START), ("goal", world.goal, GOAL)):
+    frame = Frame.of(world)
+    log_world(rec, frame)
+    drawn = frame.drawn
+    for name, point, colour in (("start", drawn.start, START), ("goal", drawn.goal, GOAL)):
         if point is not None:
-            log_marker(rec, world, name, point[None].astype(np.float32), colour)
+            log_marker(rec, drawn, name, point[None].astype(np.float32), colour)
 
 
 def application(world: World, what: str) -> str:
     """Return the name under which a viewer keeps the layout for what is drawn in a world.
 
-    Drawings of one name share a layout, which has the bounds of the world.
+    Drawings of one name share a layout, which has the bounds of the world as it is drawn. Rerun
+    takes letters, digits, spaces, "-" and "_" only; it changes other names, with a warning.
     """
+    world = Frame.of(world).drawn
     size = " x ".join(f"{side:g}" for side in world.upper - world.lower)
-    corner = ", ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
+    corner = " ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
     details = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
-    return " ".join(["brrt", what, size, *details])
+    return " ".join(["brrt", what, size, *details]).replace("+", "").replace(".", "_")
 
 
-def places(values: Any, robot: Robot) -> NDArray[np.float32]:
-    """Return where configurations, shape (n, dof), are drawn, shape (n, dim)."""
-    return np.ascontiguousarray(robot.places(np.asarray(values, np.float64)), np.float32)
-
-
-def log_world(rec: rr.RecordingStream, world: World) -> None:
-    """Draw obstacles and bounds."""
+def log_world(rec: rr.RecordingStream, frame: Frame) -> None:
+    """Draw obstacles and bounds, and what the coordinates stand for where they are not the own."""
+    world = frame.drawn
     if world.dim == 2 and not world.y_down:
         # Rerun's 2D views have y pointing down; most maps have it pointing up.
         rec.log("/world", rr.Transform3D(scale=[1, -1, 1]), static=True)
     archetypes = _archetypes_2d(world) if world.dim == 2 else _archetypes_3d(world)
     for entity, archetype in archetypes.items():
         rec.log(entity, archetype, static=True)
+    if frame.text:
+        low, high = world.lower, world.upper
+        x = (low[0] + high[0]) / 2 if world.dim == 2 else high[0]
+        place = np.array([[x, high[1] if world.y_down else low[1], *low[2:]]], np.float32)
+        log_label(rec, world, "bounds", place, TRACE, frame.text, _BELOW[world.dim])
 
 
 def log_marker(
@@ -138,6 +136,7 @@ def world_view(
         "background": list(FREE),
         "overrides": overrides or {},
     }
+    world = Frame.of(world).drawn
     margin = 0.04 * (world.upper - world.lower)
     low, high = world.lower - margin, world.upper + margin
     if world.dim == 2:

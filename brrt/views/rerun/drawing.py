@@ -22,7 +22,8 @@ from brrt.views.rerun.draw.paths import MovesDrawing, PathsDrawing
 from brrt.views.rerun.draw.plots import ExtensionsPlot, IterationTimePlot
 from brrt.views.rerun.draw.transient import TransientDrawing
 from brrt.views.rerun.draw.trees import TreesDrawing
-from brrt.views.rerun.draw_world import log_marker, log_world, places
+from brrt.views.rerun.draw_world import log_marker, log_world
+from brrt.views.rerun.frame import Frame
 from brrt.views.rerun.ring import draw_ring, place_of
 from brrt.views.rerun.stream import rrd_file
 from brrt.worlds.world import World
@@ -78,10 +79,11 @@ class RunDrawing:
         self, rec: rr.RecordingStream, manifest: Manifest, world: World, title: str = ""
     ) -> None:
         self._rec, self._manifest, self._title = rec, manifest, title
-        log_world(rec, world)
-        _log_ends(rec, manifest, world)
+        frame = self._frame = Frame.of(world)
+        log_world(rec, frame)
+        _log_ends(rec, manifest, frame)
         self._describe(None)
-        canvas, nodes = Canvas(rec, manifest, world), dict[int, DrawnNodes]()
+        canvas, nodes = Canvas(rec, manifest, frame), dict[int, DrawnNodes]()
         self._canvas = canvas
         self._transient = TransientDrawing(canvas, nodes)
         self._trees = TreesDrawing(canvas, nodes, self._transient)
@@ -112,20 +114,21 @@ class RunDrawing:
             self._describe(result)
 
     def _describe(self, result: Result | None) -> None:
-        text = self._title + layout.document(self._manifest, result)
+        text = self._title + layout.document(self._manifest, result, self._frame.text)
         markdown = rr.TextDocument(readable(text), media_type=rr.MediaType.MARKDOWN)
         self._rec.log("/run", markdown, static=True)
 
 
-def _log_ends(rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
+def _log_ends(rec: rr.RecordingStream, manifest: Manifest, frame: Frame) -> None:
     """Draw start and goal, and the body there."""
     robot = manifest.make_robot()
     for name, q, colour in (("start", manifest.start, START), ("goal", manifest.goal, GOAL)):
-        body = [np.concatenate([part, part[:1]]) for part in robot.outline(np.array(q))]
+        parts = map(frame.points, robot.outline(np.array(q)))
+        body = [np.concatenate([part, part[:1]]) for part in parts]
         if body:
             outline = rr.LineStrips2D(body, colors=colour, radii=-1.5, draw_order=90)
             rec.log(f"/world/{name}/body", outline, static=True)
-        log_marker(rec, world, name, places([q], robot), colour)
+        log_marker(rec, frame.drawn, name, frame.places([q], robot), colour)
 
 
 def _phase_text(event: np.void) -> str:

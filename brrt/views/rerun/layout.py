@@ -44,8 +44,14 @@ def application(manifest: Manifest, world: World) -> str:
     return draw_world.application(world, what)
 
 
-def document(manifest: Manifest, result: Result | None = None) -> str:
-    """Return a description of a run in Markdown, with its result if there is one."""
+def document(manifest: Manifest, result: Result | None = None, coordinates: str = "") -> str:
+    """Return a description of a run in Markdown.
+
+    Args:
+        manifest: The run's.
+        result: Its result, if there is one.
+        coordinates: What the coordinates of the drawing stand for, if they are not the world's own.
+    """
     scenario = manifest.scenario
     settings = planner_settings(manifest)[-1]
     rows = {
@@ -58,6 +64,8 @@ def document(manifest: Manifest, result: Result | None = None) -> str:
         "settings": ", ".join(f"{name}={value}" for name, value in settings.items()),
         "made by": ", ".join(f"{name} {value}" for name, value in manifest.made_by.items()),
     }
+    if coordinates:
+        rows["coordinates"] = coordinates
     for branch, change in zip(manifest.branches, changes_of(manifest), strict=True):
         rows[f"at iteration {branch.iteration:,} of {branch.file}"] = change
     rows = _results(result) | rows

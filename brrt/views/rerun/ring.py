@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from brrt.events import Events, Kind
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import RING
-from brrt.views.rerun.draw_world import log_label, places
+from brrt.views.rerun.draw_world import log_label
+from brrt.views.rerun.frame import Frame
 from brrt.worlds.world import World
 
 _RADIUS = {2: 0.02, 3: 0.04}
@@ -23,7 +24,8 @@ def draw_ring(
     rec: rr.RecordingStream, manifest: Manifest, world: World, q: NDArray[np.float64], text: str
 ) -> None:
     """Draw a ring around a configuration, shape (dof,), at all times, with a text below."""
-    place = places([q], manifest.make_robot())
+    frame = Frame.of(world)
+    place, world = frame.places([q], manifest.make_robot()), frame.drawn
     radius = _RADIUS[world.dim]
     axes = np.eye(world.dim) * radius * world.extent
     rings = [

@@ -13,8 +13,7 @@ from brrt.events import Table
 from brrt.formats.rrd.columns import time_columns
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import Colour
-from brrt.views.rerun.draw_world import places
-from brrt.worlds.world import World
+from brrt.views.rerun.frame import Frame
 
 pa: Any = pyarrow  # mypy knows none of its names
 
@@ -26,10 +25,18 @@ _ROW, _MANY = 1024, 1 << 16
 
 
 class Canvas:
-    """A Rerun recording stream to draw a run into."""
+    """A Rerun recording stream to draw a run into.
 
-    def __init__(self, rec: rr.RecordingStream, manifest: Manifest, world: World) -> None:
-        self.world, self.dim, self.robot = world, manifest.dim, manifest.make_robot()
+    Attributes:
+        frame: How coordinates are drawn.
+        world: The world as it is drawn.
+        dim: Its dimensions.
+        robot: The run's.
+    """
+
+    def __init__(self, rec: rr.RecordingStream, manifest: Manifest, frame: Frame) -> None:
+        self.frame, self.world = frame, frame.drawn
+        self.dim, self.robot = manifest.dim, manifest.make_robot()
         flat, parts = self.dim == 2, rr.components
         self._strips: Any = parts.LineStrip2DBatch if flat else parts.LineStrip3DBatch
         self.lines: Any = rr.LineStrips2D if flat else rr.LineStrips3D
@@ -41,7 +48,7 @@ class Canvas:
 
     def places(self, values: Any) -> NDArray[np.float32]:
         """Return where configurations, shape (n, dof), are drawn, shape (n, dim)."""
-        return places(values, self.robot)
+        return self.frame.places(values, self.robot)
 
     def style(
         self, entity: str, archetype: Any, colour: Colour, radius: float, layer: float

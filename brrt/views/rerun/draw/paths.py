@@ -96,7 +96,7 @@ class PathsDrawing:
         path, robot = event["waypoints"], self._canvas.robot
         if not robot.outline(path[0]):
             return
-        steps = float(event["cost"]) / (_APART * self._canvas.world.extent)
+        steps = float(event["cost"]) / (_APART * self._canvas.frame.world.extent)
         poses = list(robot.along(path, int(np.clip(steps + 1, 2, _GHOSTS))))
         draw_bodies(self._canvas, GHOSTS_ENTITY, times_of([event]), [poses])
 
@@ -116,7 +116,7 @@ class MovesDrawing:
 
     def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
         self._canvas = canvas
-        self._edge = edge = contract_of(manifest, canvas.world).epsilon
+        self._edge = edge = contract_of(manifest, canvas.frame.world).epsilon * canvas.frame.scale
         limits = _MOVES_IN_3D if edge and canvas.dim > 2 else ()
         self._decimation = Decimation(canvas.world, *limits)
         self._start = canvas.places([manifest.start])
@@ -170,7 +170,7 @@ def draw_bodies(canvas: Canvas, entity: str, rows: Table, poses: list[Any]) -> N
     """Draw the body at one configuration or more, a list of them a row."""
     strips, counts = list[NDArray[np.float32]](), []
     for row in poses:
-        parts = [part for q in row for part in canvas.robot.outline(q)]
+        parts = [canvas.frame.points(part) for q in row for part in canvas.robot.outline(q)]
         strips += [np.concatenate([part, part[:1]]).astype(np.float32) for part in parts]
         counts.append(len(parts))
     if strips:
