@@ -1,7 +1,7 @@
 """Whether motions are free: numpy geometry that shares no code with the planners.
 
 A motion of a point is blocked if it enters an obstacle by more than `DEPTH` of the lengths
-involved, which is above all rounding. For bodies, see `brrt.collision.bodies`.
+involved, which is above all rounding. For bodies, see `brrt.collision.sweep`.
 """
 
 from collections.abc import Iterator
@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.collision.bodies import swept_clear, swept_hits, towards
+from brrt.collision.bodies import towards
 from brrt.collision.obstacles import Obstacles, near_pairs
+from brrt.collision.sweep import swept_clear, swept_hits
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,7 +43,7 @@ def first_hits(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Ints:
 def all_clear(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Flags:
     """Return which motions have more clearance than a planner may reject, shape (n,).
 
-    For a point that is `DEPTH` of the lengths involved, for a body `bodies.MARGIN` of the map.
+    For a point that is `DEPTH` of the lengths involved, for a body `sweep.MARGIN` of the map.
     """
     if not len(a):
         return np.empty(0, bool)

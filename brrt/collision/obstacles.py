@@ -2,15 +2,12 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.convex import ConvexShapes, convex_shapes
 from brrt.worlds.world import World
-
-if TYPE_CHECKING:
-    from brrt.collision.bodies import ConvexShapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -56,10 +53,8 @@ class Obstacles:
         return len(self) + 1
 
     @cached_property
-    def shapes(self) -> "ConvexShapes":
+    def shapes(self) -> ConvexShapes:
         """All obstacles in the plane as convex shapes; balls are points with a radius."""
-        from brrt.collision.bodies import convex_shapes  # noqa: PLC0415 - a cycle
-
         hulls = [_corners(box) for box in self.boxes] + list(self.balls[:, None, :2])
         radius = np.zeros(len(self))
         radius[len(self.boxes) : self.ends[1]] = self.balls[:, 2]
@@ -69,7 +64,7 @@ class Obstacles:
     def round(self) -> Flags:
         """Which obstacles are balls or points, shape (n,)."""
         vertices = self.shapes.vertices
-        return np.asarray((vertices == vertices[:, :1]).all(axis=1))
+        return np.asarray((vertices == vertices[0]).all(axis=0))
 
     @cached_property
     def strips(self) -> tuple[int, list[tuple[Ints, Floats, Floats]]]:
