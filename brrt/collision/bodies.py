@@ -143,14 +143,14 @@ class Body:
         before = _before(rate)
         for i in np.unique(self.pairs[:, 0]).tolist():
             mine = self.pairs[:, 0] == i
-            seen = (each[:, i + 1 :] - rate[:, [i]] for each in (before, rate))
-            found = self._chain_bounds(*seen, i + 1)
+            arms, links = (each[:, i + 1 :] - rate[:, [i]] for each in (before, rate))
+            found = self._chain_bounds(arms, links, i + 1)
             which = self.pairs[mine, 1] - (i + 1)
             move[:, mine], bend[:, mine] = found.move[:, which], found.bend[:, which]
         return Bounds(move, bend)
 
     def _chain_bounds(self, before: Floats, rate: Floats, first: int) -> Bounds:
-        """Return bounds for the links from one on, from the rates of the arms before, and theirs."""
+        """Return bounds for the links from one on, from the rates of the arms and of the links."""
         arms, far = np.abs(self._offset[first:]), self._far[first:]
         move = np.cumsum(np.abs(before) * arms, axis=1) + np.abs(rate) * far
         bend = np.cumsum(before**2 * arms, axis=1) + rate**2 * far

@@ -3,8 +3,8 @@
 A motion is bisected (Schwarzer, Saha and Latombe 2005), for each part of the body and each thing
 that it may hit: an obstacle, the bounds, another part. In the middle of a piece the two are apart
 along some axis. The piece is free if no point crosses that gap: if none moves as far in half of the
-piece, or if none does along the axis, by its velocity in the middle and a bound of its acceleration.
-A piece in whose middle the two touch is blocked. After `HALVINGS` bisections, which is 1024 pieces
+piece, or none does along the axis, by its velocity in the middle and a bound of its acceleration. A
+piece in whose middle the two touch is blocked. After `HALVINGS` bisections, which is 1024 pieces
 of a motion, a piece that is neither counts as free where a motion is said to be free, and as
 blocked where it is said to be blocked.
 """
@@ -227,31 +227,35 @@ class _Place:
         Returns:
             The bounds in the middle of the pieces, and those for all of each piece.
         """
-        other, shapes = self.pieces.other, self.obstacles.shapes
-        apart, least = np.empty((2, len(self.pieces)))
+        other, apart = self.pieces.other, np.empty(len(self.pieces))
+        least, ball = np.empty_like(apart), np.zeros(len(apart), bool)
         walls, own = other == self.obstacles.bounds, other == self.obstacles.itself
-        for which, gaps in ((walls, self._from_walls), (own, self._from_itself)):
-            if which.any():
-                rows = np.flatnonzero(which)
-                apart[rows], least[rows] = gaps(rows, half)
         rest = np.flatnonzero(~(walls | own))
-        round_ = self.obstacles.round[other[rest]]
-        if not round_.all():
-            rows = rest[~round_]
-            part, j = self.placed(rows, self.pieces.part[rows]), other[rows]
-            gap, axis = separation(
-                part.vertices, part.axes, shapes.vertices[:, j], shapes.axes[:, j]
-            )
-            apart[rows] = gap
-            least[rows] = self._least(rows, half, part.vertices, part.velocity, gap, axis)
-        if round_.any():
-            rows = rest[round_]
-            part, j = self.placed(rows, self.pieces.part[rows]), other[rows]
-            gap, axis = from_point(part.vertices, part.axes, shapes.vertices[0, j])
-            apart[rows] = gap - shapes.radius[j]
-            least[rows] = self._least(rows, half, part.vertices, part.velocity, gap, axis)
-            least[rows] -= shapes.radius[j]
+        ball[rest] = self.obstacles.round[other[rest]]
+        for which, gaps in (
+            (walls, self._from_walls),
+            (own, self._from_itself),
+            (ball, self._from_balls),
+            (~(walls | own | ball), self._from_polygons),
+        ):
+            rows = np.flatnonzero(which)
+            if len(rows):
+                apart[rows], least[rows] = gaps(rows, half)
         return apart, np.maximum(least, apart - self.pieces.move * half)
+
+    def _from_polygons(self, rows: Ints, half: float) -> tuple[Floats, Floats]:
+        j, shapes = self.pieces.other[rows], self.obstacles.shapes
+        part = self.placed(rows, self.pieces.part[rows])
+        other = shapes.vertices[:, j], shapes.axes[:, j]
+        gap, axis = separation(part.vertices, part.axes, *other)
+        return gap, self._least(rows, half, part.vertices, part.velocity, gap, axis)
+
+    def _from_balls(self, rows: Ints, half: float) -> tuple[Floats, Floats]:
+        j, shapes = self.pieces.other[rows], self.obstacles.shapes
+        part = self.placed(rows, self.pieces.part[rows])
+        gap, axis = from_point(part.vertices, part.axes, shapes.vertices[0, j])
+        least = self._least(rows, half, part.vertices, part.velocity, gap, axis)
+        return gap - shapes.radius[j], least - shapes.radius[j]
 
     def _from_walls(self, rows: Ints, half: float) -> tuple[Floats, Floats]:
         part = self.placed(rows, self.pieces.part[rows])
