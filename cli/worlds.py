@@ -83,6 +83,8 @@ def list_worlds(
         for line in (
             "Show one: brrt worlds show circles2d:n=80,seed=3, or map.yaml:unknown=free",
             "Plan in one: brrt plan --world arena.map.scen#12",
+            "Obstacles are the same for all robots and queries, except that scattered ones and",
+            "trees closer to the robot at start or goal than 1 % of the size are left out.",
         ):
             print_line(line)
 

@@ -94,9 +94,10 @@ def make_world(
     Args:
         spec: A generator with parameters, such as `circles2d:n=50,max_radius=5`, or a file, such
             as `map.yaml:unknown=free` or `arena.map.scen#12`.
-        start: Point that a generator keeps free, shape (d,).
-        goal: Another.
-        room: Distance to keep free around them, in addition to the generator's own clearance.
+        start: Where the query starts, shape (d,). Scattered obstacles and trees of a generated
+            world that are close to it are left out; the others do not depend on the query.
+        goal: Where it ends.
+        room: How close, in addition to 1 % of the world's size.
 
     Raises:
         BrrtError: There is no such generator or file, or a parameter is wrong.

@@ -68,7 +68,7 @@ def test_each_has_its_own_generator() -> None:
     plain = Scenario(world=ROBOTS["point"], planner="rrt-connect")
     assert Problem.of(plain).world.to_json() == both.world.to_json()
     for each in (scenario("point"), replace(scenario("point"), start=start, goal=goal)):
-        # A given query has its places kept free, so it may not meet the same world.
+        # Obstacles close to a given query are left out, so its world may have fewer.
         memory = Memory()
         Run(each).execute([memory])
         logs.append(memory.events())

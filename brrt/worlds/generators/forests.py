@@ -10,7 +10,7 @@ from brrt.digits import against_limits, tell_apart
 from brrt.errors import BrrtError
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats
-from brrt.worlds.generators.generator import CLEARANCE, Length, ObstacleSet, Query, Seeded
+from brrt.worlds.generators.generator import CLEARANCE, Length, ObstacleSet, Seeded
 
 _CANDIDATES = 30
 """Places that are tried around a tree before it is considered surrounded; Bridson's k."""
@@ -89,7 +89,12 @@ class _PointGrid:
 
 @dataclass(frozen=True, slots=True)
 class PoissonForest(Seeded):
-    """Trees at random places with a minimum distance; start and goal are in opposite corners."""
+    """Trees at random places with a minimum distance; start and goal are in opposite corners.
+
+    Trees closer than 1 % of the size to start or goal are left out.
+    """
+
+    clears: ClassVar[bool] = True
 
     radius: float | None = param(None, "radius of the trunks; auto: 0.015 of the size", above=0)
     gap: float | None = param(
@@ -116,10 +121,10 @@ class PoissonForest(Seeded):
         """Minimum distance of the middles of two trunks."""
         return 2 * self.trunk + self.free_gap
 
-    def trees(self, rng: np.random.Generator, query: Query) -> Floats:
+    def trees(self, rng: np.random.Generator) -> Floats:
         """Draw the middles of the trunks, shape (n, 2)."""
-        reach = self.trunk + CLEARANCE * self.size + query.room
-        kept = np.stack([query.start[:2], query.goal[:2]])
+        reach = self.trunk + CLEARANCE * self.size
+        kept = np.stack(self.ends(0.0))[:, :2]
 
         def allowed(points: Floats) -> Bools:
             distances = np.linalg.norm(points[:, None] + self.trunk - kept, axis=2)
@@ -140,9 +145,9 @@ class Forest2D(PoissonForest):
 
     dim: ClassVar[int] = 2
 
-    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
         """Draw the trees."""
-        trees = self.trees(rng, query)
+        trees = self.trees(rng)
         return ObstacleSet(balls=np.column_stack([trees, np.full(len(trees), self.trunk)]))
 
 
@@ -166,9 +171,9 @@ class Forest3D(PoissonForest):
             texts = tell_apart(self.min_height, self.max_height)
             raise BrrtError(f"min_height {texts[0]} is above max_height {texts[1]}; swap them")
 
-    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
         """Draw the trees, then their heights."""
-        trees = self.trees(rng, query)
+        trees = self.trees(rng)
         heights = self.size * rng.uniform(self.min_height, self.max_height, len(trees))
         half = self.trunk / np.sqrt(2)
         return ObstacleSet(

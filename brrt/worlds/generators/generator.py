@@ -12,22 +12,13 @@ from brrt.errors import BrrtError
 from brrt.settings import Settings, param
 from brrt.worlds.arrays import Floats
 from brrt.worlds.free_space import connected
+from brrt.worlds.generators.clearing import clear_ends
 from brrt.worlds.world import World
 
 CLEARANCE = 0.01
 """Distance between obstacles and start or goal, as a fraction of the world's size."""
 _MARGIN = 0.05
 """Distance of start and goal from the bounds, as a fraction of the world's size."""
-_DRAWS = 100
-"""Draws of a random world before it is considered not to be connectable."""
-
-
-class Query(NamedTuple):
-    """Where a query starts and ends, shape (d,) each, and the distance to keep free around both."""
-
-    start: Floats
-    goal: Floats
-    room: float
 
 
 class ObstacleSet(NamedTuple):
@@ -58,15 +49,26 @@ class Length:
 
 @dataclass(frozen=True, slots=True)
 class Generator(Settings):
-    """A world from 0 to `size` along each axis, unless a subclass says otherwise."""
+    """A world from 0 to `size` along each axis, unless a subclass says otherwise.
+
+    Its parameters alone decide where the obstacles are. Around a query they are left out, if at
+    all, and never placed elsewhere.
+
+    Attributes:
+        dim: 2 or 3.
+        draws: Draws of a random world before it is considered not to be connectable.
+        clears: Whether obstacles close to start or goal are left out; others are structures.
+    """
 
     dim: ClassVar[int]
+    draws: ClassVar[int] = 1
+    clears: ClassVar[bool] = False
 
     size: float = param(100.0, "side of the map", above=0)
     connected: bool = param(False, "guarantee a path from start to goal for a point")
 
     @abstractmethod
-    def candidates(self, query: Query, /) -> Iterator[ObstacleSet]:
+    def candidates(self) -> Iterator[ObstacleSet]:
         """Yield sets of obstacles; the first is used unless the world is to be connected."""
 
     def upper(self) -> Floats:
@@ -117,8 +119,8 @@ class Generator(Settings):
 
         Args:
             name: Its name.
-            start: Where the query starts, shape (d,); scattered obstacles keep away from it. A
-                point of another shape is ignored: the query refuses it later.
+            start: Where the query starts, shape (d,). A point of another shape is ignored: the
+                query refuses it later.
             goal: Where the query ends.
             room: Distance to keep free around both, in addition to the generator's clearance.
 
@@ -132,44 +134,58 @@ class Generator(Settings):
             else np.asarray(given, np.float64)
             for given, default in zip((start, goal), self.ends(room), strict=True)
         )
-        lower, upper = np.zeros(self.dim), self.upper()
-        draws, reason = 0, ""
         try:
-            for obstacles in self.candidates(Query(start, goal, room)):
-                world = World(name, lower, upper, start=start, goal=goal, **obstacles._asdict())
-                if not self.connected:
-                    return world
+            world = replace(self._drawn(name), start=start, goal=goal)
+            if self.clears:
+                world = clear_ends(world, CLEARANCE * self.size + room)
+            if self.connected:
                 found = connected(world, start, goal)
-                if found.connected and draws:
-                    note = f"connected: draw {draws + 1} is the first with a path"
-                    return replace(world, notes=(*world.notes, note))
-                if found.connected:
-                    return world
-                draws, reason = draws + 1, found.reason
+                if not found.connected:
+                    raise _no_path(found.reason)
         except BrrtError as error:
             raise BrrtError(f"world {name}: {error}") from None
-        where = f" in the last of {draws} draws" if draws > 1 else ""
-        raise BrrtError(
-            f"world {name}: no path from start to goal was found ({reason}{where}); ask for fewer "
-            f"or smaller obstacles, wider openings, or another start or goal"
-        )
+        return world
+
+    def _drawn(self, name: str) -> World:
+        """Return the world of the parameters: a connected one has a path for its own query."""
+        lower, upper, (start, goal) = np.zeros(self.dim), self.upper(), self.ends(0.0)
+        reason = ""
+        for draw, obstacles in enumerate(self.candidates(), 1):
+            world = World(name, lower, upper, start=start, goal=goal, **obstacles._asdict())
+            if not self.connected or self.draws == 1:
+                return world
+            found = connected(world, start, goal)
+            if found.connected:
+                note = f"connected: draw {draw} is the first with a path"
+                return replace(world, notes=(*world.notes, note) if draw > 1 else world.notes)
+            reason = f"{found.reason} in the last of {draw} draws"
+        raise _no_path(reason)
+
+
+def _no_path(reason: str) -> BrrtError:
+    return BrrtError(
+        f"no path from start to goal was found ({reason}); ask for fewer or smaller obstacles, "
+        f"wider openings, or another seed, start or goal"
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Seeded(Generator):
     """A world that is drawn at random from a seed."""
 
+    draws: ClassVar[int] = 100
+
     seed: int = param(0, "seed of the random draws", low=0)
 
     @abstractmethod
-    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
         """Draw the obstacles."""
 
-    def candidates(self, query: Query, /) -> Iterator[ObstacleSet]:
+    def candidates(self) -> Iterator[ObstacleSet]:
         """Draw from the seed itself, then from seeds derived from it."""
-        yield self.obstacles(np.random.default_rng(self.seed), query)
-        for derived in np.random.SeedSequence(self.seed).spawn(_DRAWS - 1):
-            yield self.obstacles(np.random.default_rng(derived), query)
+        yield self.obstacles(np.random.default_rng(self.seed))
+        for derived in np.random.SeedSequence(self.seed).spawn(self.draws - 1):
+            yield self.obstacles(np.random.default_rng(derived))
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +196,6 @@ class Fixed(Generator):
     def obstacles(self) -> ObstacleSet:
         """Return the obstacles."""
 
-    def candidates(self, _query: Query, /) -> Iterator[ObstacleSet]:
+    def candidates(self) -> Iterator[ObstacleSet]:
         """Yield the only candidate."""
         yield self.obstacles()

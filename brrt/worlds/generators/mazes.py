@@ -10,7 +10,7 @@ from brrt.errors import BrrtError
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats, Ints
 from brrt.worlds.generators.box_subtraction import merge_cells
-from brrt.worlds.generators.generator import Fixed, Length, ObstacleSet, Query, Seeded
+from brrt.worlds.generators.generator import Fixed, Length, ObstacleSet, Seeded
 
 _WALL = 0.1
 """Default thickness of walls, as a fraction of the distance from cell to cell."""
@@ -128,7 +128,7 @@ class Maze2D(Seeded):
         first, last = edges[:2].mean(), edges[-2:].mean()
         return np.full(self.dim, first), np.full(self.dim, last)
 
-    def obstacles(self, rng: np.random.Generator, _query: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
         """Draw which cells are connected, and return the other walls."""
         shape = (self.cells,) * self.dim
         edges = _edges(self.size, self.cells, self.thickness)
@@ -185,7 +185,7 @@ class Rooms2D(Seeded):
         """Return the middles of two opposite corner rooms."""
         return np.full(2, self.side / 2), np.full(2, self.size - self.side / 2)
 
-    def obstacles(self, rng: np.random.Generator, _query: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
         """Draw which walls have doors and where, and return the rest of the walls."""
         shape = (self.rooms, self.rooms)
         has_door = np.zeros((2, self.rooms, self.rooms), np.bool_)

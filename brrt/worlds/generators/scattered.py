@@ -12,7 +12,7 @@ from brrt.errors import BrrtError
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats
 from brrt.worlds.generators.density import count_for_density
-from brrt.worlds.generators.generator import CLEARANCE, ObstacleSet, Query, Seeded
+from brrt.worlds.generators.generator import CLEARANCE, ObstacleSet, Seeded
 from brrt.worlds.obstacle_arrays import ObstacleArray, obstacle_arrays
 from brrt.worlds.world import World
 
@@ -27,12 +27,15 @@ obstacles must not depend on the density."""
 class Scattered(Seeded):
     """Obstacles distributed uniformly over a square or cube.
 
-    Start and goal are in opposite corners, 5 % of the size from each wall, unless they are given.
-    Obstacles that would cover one of them are drawn again.
+    Start and goal are in opposite corners, 5 % of the size from each wall: obstacles closer than
+    1 % of the size to one of them are drawn again. Where the query starts or ends elsewhere, or
+    with a larger robot, such obstacles are left out and the others stay.
 
     An obstacle is drawn as a centre and a shape: a row whose first number is the radius of a circle
     around the obstacle, or its half extents.
     """
+
+    clears: ClassVar[bool] = True
 
     n: int = param(_DEFAULT, "number of obstacles", low=0, high=_MOST)
     density: float | None = param(
@@ -58,10 +61,10 @@ class Scattered(Seeded):
     def place(self, centres: Floats, shapes: Floats) -> ObstacleSet:
         """Make obstacles from centres and shapes."""
 
-    def obstacles(self, rng: np.random.Generator, query: Query, /) -> ObstacleSet:
+    def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
         """Draw n obstacles, or as many as the density takes."""
         if self.density is None:
-            return self.place(*self._draw_apart(rng, self.n, query))
+            return self.place(*self._draw_apart(rng, self.n))
         drawn: list[tuple[Floats, Floats]] = []
 
         def batches() -> Iterator[ObstacleArray]:
@@ -69,7 +72,7 @@ class Scattered(Seeded):
             while count < _MOST:
                 n = min(_BATCHES[min(len(drawn), len(_BATCHES) - 1)], _MOST - count)
                 count += n
-                drawn.append(self._draw_apart(rng, n, query))
+                drawn.append(self._draw_apart(rng, n))
                 placed = self.place(*drawn[-1])._asdict()
                 yield from obstacle_arrays(World("", np.zeros(self.dim), self.upper(), **placed))
 
@@ -78,13 +81,13 @@ class Scattered(Seeded):
         note = f"density {self.density:g}: {count} obstacles cover {share:.4f} of the map"
         return self.place(centres, shapes)._replace(notes=(note,))
 
-    def _draw_apart(self, rng: np.random.Generator, n: int, query: Query) -> tuple[Floats, Floats]:
-        """Draw n obstacles that keep away from start and goal."""
-        clearance = CLEARANCE * self.size + query.room
+    def _draw_apart(self, rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
+        """Draw n obstacles that keep away from the world's own start and goal."""
+        clearance, ends = CLEARANCE * self.size, self.ends(0.0)
         centres, shapes = self.draw(rng, n)
         for _ in range(_REDRAWS):
             bad = np.zeros(n, bool)
-            for end in (query.start, query.goal):
+            for end in ends:
                 bad |= self.covers(centres, shapes, end, clearance)
             count = int(bad.sum())
             if count == 0:
