@@ -242,6 +242,15 @@ FORMS: dict[str, Callable[[Parts], bytes]] = {
         *(chunk(*group) for _, group in itertools.groupby(by_channel(p), lambda m: m.channel_id)),
     ),
     "last first": lambda p: file_of(p, chunk(*p.declared), *(chunk(m) for m in p.messages[::-1])),
+    "no sequence numbers": lambda p: file_of(
+        p, chunk(*p.declared, *(replace(m, sequence=0) for m in by_channel(p)))
+    ),
+    "no sequence numbers, chunks of one": lambda p: file_of(
+        p, chunk(*p.declared), *(chunk(replace(m, sequence=0)) for m in p.messages)
+    ),
+    "no sequence numbers, unchunked": lambda p: file_of(
+        p, record_bytes(*p.declared, *(replace(m, sequence=0) for m in p.messages))
+    ),
     "no result": lambda p: file_of(p, chunk(*p.declared, *p.messages), tail=False),
     "index of nothing": lambda p: file_of(
         p, chunk(*p.declared, *p.messages), record_bytes(MessageIndex(1, []), MessageIndex(77, []))
@@ -402,6 +411,12 @@ ERRORS: dict[str, tuple[Callable[[Parts], bytes], str]] = {
     "damaged lz4": (
         lambda p: file_of(p, chunk(*p.declared, *p.messages, compression="lz4")),
         "a chunk cannot be unpacked",
+    ),
+    "no sequence numbers and out of order": (
+        lambda p: file_of(
+            p, *(chunk(*p.declared, replace(m, sequence=0)) for m in p.messages[:2] + p.messages)
+        ),
+        "messages without sequence numbers are not in the order of their times",
     ),
     "fewer than the result says": (
         lambda p: file_of(p, chunk(*p.declared, *p.messages[:-3])),

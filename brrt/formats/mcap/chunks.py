@@ -50,6 +50,7 @@ class ChunkDecoder:
         self._channels: dict[int, Channel] = {}
         self._declared_bytes = self._walked = self._packed = 0
         self._waiting, self._waiting_bytes = Waiting(dof), 0
+        self._last_t: int | None = None
 
     def events(self, raw: bytes, index: Index, packed: int) -> Events:
         """Decode the messages of a chunk.
@@ -80,6 +81,7 @@ class ChunkDecoder:
         # The index is wrong or not there, as where a file was cut after a chunk, or there are other
         # records between the messages. The records lead from one to the next.
         tables, _ = self._decode(raw, self._walk(raw, begin))
+        self._number([table for _, table in tables])
         for kind, table in tables:
             self._waiting.add(kind, table)
         return self._next(len(raw))
@@ -116,6 +118,26 @@ class ChunkDecoder:
                 "is lost, sort the file by its log times"
             )
         return Events(self._dof, {})
+
+    def _number(self, tables: list[Table]) -> None:
+        """Number events by their times if they have no numbers: tools may write 0 for all.
+
+        Raises:
+            BrrtError: They have none, and their times do not follow those before.
+        """
+        t = np.concatenate([np.empty(0, np.int64), *(table["t"] for table in tables)])
+        first, none = self.numbering.next, not any(table["seq"].any() for table in tables)
+        begins = first <= 1 < first + len(t) and not self._waiting.count
+        if not (len(t) and none and (begins or self._last_t is not None)):
+            return
+        if self._last_t is not None and t.min() <= self._last_t:
+            raise BrrtError("messages without sequence numbers are not in the order of their times")
+        self._last_t = int(t.max())
+        seqs = np.empty(len(t), np.int64)
+        seqs[np.argsort(t, kind="stable")] = first + np.arange(len(t))
+        ends = np.cumsum([len(table) for table in tables])
+        for table, part in zip(tables, np.split(seqs, ends[:-1]), strict=True):
+            table["seq"] = part
 
     def _decode(self, raw: bytes, index: Index) -> tuple[list[tuple[Kind, Table]], int]:
         """Decode the messages of our channels; return how many bytes they are, too."""

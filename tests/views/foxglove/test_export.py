@@ -30,7 +30,9 @@ from brrt.events import Stage
 from brrt.views.colours import heat, tree_style
 from brrt.views.foxglove import export as module
 from brrt.views.foxglove import interval_topics
+from brrt.views.foxglove.draw_world import static_messages
 from brrt.views.foxglove.export import export
+from brrt.views.foxglove.messages import fits
 from brrt.worlds.free_space import occupied
 from tests.conftest import recorded
 from tests.support.recordings import RECORDINGS
@@ -448,3 +450,32 @@ def test_progress_rises_to_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert 0 <= parts[0] < 0.5 < parts[-1] <= 1
     small = load(tmp_path / "viz.mcap", recording)
     assert segments(small.at(recording.events().last.t, "/viz/tree/"))
+
+
+def test_places_far_from_the_origin_are_exact(tmp_path: Path) -> None:
+    """Nodes, which are 1e-5 degrees apart, are where the events say, the start among them."""
+    lower = np.array([139.763416, 35.6785133])
+    far = World("far", lower, lower + 2e-4, start=lower + 1e-5, goal=lower + 1.8e-4)
+    far.save(tmp_path / "far.json")
+    scenario = Scenario(world=str(tmp_path / "far.json"), planner="rrt-star", iterations=100)
+    run, log = recorded(scenario)
+    export(of(run, log), tmp_path / "viz.mcap")
+    given = load(tmp_path / "viz.mcap", of(run, log))
+    nodes = {
+        point[:2] for marker in given.at(log.last.t, "/viz/tree/start") for point in points(marker)
+    }
+    assert nodes == set(map(tuple, log[Kind.EDGE]["q"].tolist()))
+    start = given.at(log.last.t, "/viz/start")[0].markers[0].pose.position
+    assert (start.x, start.y) == run.manifest.start
+    assert (start.x, start.y) in nodes
+
+
+@pytest.mark.parametrize("resolution", [0.05, 1e-50, 1e60])
+def test_grids_whose_edge_is_no_float32(resolution: float, tmp_path: Path) -> None:
+    """A map is a message if its cells are right there, otherwise triangles."""
+    grid = Grid(np.eye(4, dtype=bool), np.zeros(2), resolution)
+    world = World.of_grid("grid", grid, start=np.array([2.5, 0.5]) * resolution)
+    run, _ = recorded(Scenario(world="circles2d:n=3", iterations=5))
+    assert fits(grid) == (resolution == 0.05)
+    topics = {topic for topic, *_ in static_messages(run.manifest, world)}
+    assert ("/viz/map" in topics) == fits(grid)
