@@ -24,7 +24,7 @@ corners leave the box's own unfilled."""
 _LAYERS, _OVERLAP = 5, 1.5
 """Nested lines that fill half of a box in 2D, and their distance in radii: less than 2, so that
 each covers the round corners of the next."""
-_BELOW = {2: 0.02, 3: 0.05}
+_BELOW = {2: 0.04, 3: 0.05}
 """How far below the bounds the text is that explains the coordinates, as a part of the extent."""
 _PIXELS = 640
 """Pixels along the longer side of the image that fills polygons: about a window's resolution."""
@@ -67,10 +67,14 @@ def application(world: World, what: str) -> str:
     Drawings of one name share a layout, which has the bounds of the world as it is drawn. Rerun
     takes letters, digits, spaces, "-" and "_" only; it changes other names, with a warning.
     """
-    world = Frame.of(world).drawn
+    frame = Frame.of(world)
+    world = frame.drawn
     size = " x ".join(f"{side:g}" for side in world.upper - world.lower)
     corner = " ".join(f"{value:g}" for value in world.lower) if world.lower.any() else ""
-    details = filter(None, [corner and f"from {corner}", "y down" if world.y_down else ""])
+    details = filter(
+        None,
+        [corner and f"from {corner}", "y down" if world.y_down else "", frame.text and "moved"],
+    )
     return " ".join(["brrt", what, size, *details]).replace("+", "").replace(".", "_")
 
 
@@ -136,9 +140,12 @@ def world_view(
         "background": list(FREE),
         "overrides": overrides or {},
     }
-    world = Frame.of(world).drawn
+    frame = Frame.of(world)
+    world = frame.drawn
     margin = 0.04 * (world.upper - world.lower)
     low, high = world.lower - margin, world.upper + margin
+    if frame.text and world.dim == 2:  # it stands below the bounds
+        (high if world.y_down else low)[1] += (1 if world.y_down else -1) * _BELOW[2] * world.extent
     if world.dim == 2:
         y_range = [low[1], high[1]] if world.y_down else [-high[1], -low[1]]
         bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=y_range)

@@ -103,7 +103,7 @@ def _cell(value: object) -> str:
 
 
 def _numbers(values: tuple[float, ...]) -> str:
-    return ", ".join(f"{value:g}" for value in values)
+    return ", ".join(f"{value:.10g}" for value in values)
 
 
 def blueprint(manifest: Manifest, world: World, *, live: bool = False) -> rrb.Blueprint:
