@@ -1,5 +1,6 @@
 """Two recordings compared; their events are read no further than needed."""
 
+from collections import deque
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -87,8 +88,7 @@ class _Log:
         if self._complete or set(_NEEDED) <= (self._recording.result or {}).keys():
             return
         try:
-            for _ in self:
-                pass
+            deque(self, maxlen=0)
         except RecordingError:  # after the first difference, so that only the metrics end here
             self._complete = self._damaged = True
 

@@ -43,9 +43,8 @@ class Difference:
         left, right = self.left, self.right
         if left is None or right is None:
             which, other = ("first", right) if left is None else ("second", left)
-            return (
-                f"event {self.seq}: the {which} log has ended; the other has {_full(other or {})}"
-            )
+            there = _full(other or {})
+            return f"event {self.seq}: the {which} log has ended; the other has {there}"
         if left["kind"] != right["kind"]:
             return f"event {self.seq}: {_full(left)} against {_full(right)}"
         parts = [f"{name} {_text(a)} against {_text(b)}" for name, a, b in self._values()]
@@ -97,26 +96,18 @@ class Difference:
                 yield next((f"waypoint {i}", p, q) for i, (p, q) in pairs if not equal_values(p, q))
 
     def as_dict(self, names: tuple[str, str]) -> dict[str, Any]:
-        """Return the difference as plain data for JSON.
-
-        Args:
-            names: Keys of the two events.
-        """
+        """Return the difference as plain data for JSON; `names` are keys of the two events."""
         return {
             "seq": self.seq,
-            names[0]: _plain(self.left),
-            names[1]: _plain(self.right),
+            names[0]: plain(self.left),
+            names[1]: plain(self.right),
             "fields": self.fields,
-            "before": [_plain(event) for event in self.before],
+            "before": plain(self.before),
         }
 
 
 def event_lines(events: Sequence[Event]) -> Iterator[str]:
-    """Yield the last of some events in full, and the ones before it briefly, in 80 columns.
-
-    Args:
-        events: The events, in order.
-    """
+    """Yield the last of some events in full, and the ones before it briefly, in 80 columns."""
     if not events:
         return
     *before, last = events
@@ -176,12 +167,12 @@ def equal_values(a: Any, b: Any) -> bool:
     return np.array_equal(a, b, equal_nan=not isinstance(a, str))
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return a value as JSON has it, without infinities and nan."""
     if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
+        return {name: plain(each) for name, each in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(each) for each in value]
+        return [plain(each) for each in value]
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -39,16 +39,10 @@ def first_difference(
 ) -> Difference | None:
     """Return the first event that differs between two logs, apart from times; None if none does.
 
-    Nothing is read after that event's batch.
-
-    Args:
-        left: The first log, in batches of any size.
-        right: The second log.
-        deviation: The tolerance, which takes in the greatest deviation; by default every bit
-            counts.
+    The logs come in batches of any size; nothing is read after that event's batch. `deviation`
+    takes in the greatest deviation; by default every bit counts.
     """
-    deviation = Deviation() if deviation is None else deviation
-    recent = RecentEvents()
+    deviation, recent = deviation or Deviation(), RecentEvents()
     a_batches, b_batches = recent.passing(left), iter(right)
     a, b = next(a_batches, None), next(b_batches, None)
     while a is not None and b is not None:
@@ -61,8 +55,7 @@ def first_difference(
     if rest is None:
         return None
     seq, _ = rest.kinds_in_order()
-    event = event_at(rest, seq)
-    ours, theirs = (event, None) if a is not None else (None, event)
+    ours, theirs = (None if log is None else event_at(log, seq) for log in (a, b))
     return Difference(seq, ours, theirs, recent.before(seq))
 
 
@@ -106,7 +99,7 @@ def _end(events: Events) -> int:
 def _rest(events: Events, end: int, batches: Iterator[Events]) -> Events | None:
     """Return the part of a batch from `end` on, or the next batch."""
     if _end(events) == end:
-        return next((b for b in batches if len(b)), None)
+        return next(filter(len, batches), None)
     tables = {k: t[np.searchsorted(t["seq"], end) :] for k, t in events.tables.items()}
     return Events(events.dof, {k: t for k, t in tables.items() if len(t)})
 

@@ -156,7 +156,9 @@ def _outcome(found: Comparison) -> Iterator[str]:
               for end, cut in zip(ends, found.cuts, strict=True))  # fmt: skip
         yield _row("  ended by", *by)
     a, b = _motions(a), _motions(b)
-    for name in _printed(found):
+    printed = [*METRICS, *(TIMES if found.timed else ())]
+    printed.insert(METRICS.index("moves"), "motions")
+    for name in printed:
         x, y = a.get(name), b.get(name)
         if x is not None or y is not None:
             values = (_seconds(x), _seconds(y)) if name in TIMES else brief_pair(x, y)
@@ -164,21 +166,10 @@ def _outcome(found: Comparison) -> Iterator[str]:
             yield _row(f"  {text}", *values, _change(x, y))
 
 
-def _printed(found: Comparison) -> Iterator[str]:
-    """Yield the names of the metrics that are printed, in order."""
-    for name in METRICS:
-        yield name
-        if name == "iterations":
-            yield "motions"
-    if found.timed:
-        yield from TIMES
-
-
 def _motions(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """Return metrics with the path's motions; moves are kept only of a robot that moved."""
-    moved = metrics.get("max_move_time_s") is not None
     path = metrics.get("smoothed_path") or metrics.get("path")
-    moves = metrics.get("moves") if moved else None
+    moves = None if metrics.get("max_move_time_s") is None else metrics.get("moves")
     return {**metrics, "moves": moves, "motions": len(path) - 1 if path else None}
 
 

@@ -19,13 +19,7 @@ _PLAIN = ("planner", "seed", "draws", "time", "smooth", "shortcuts", "execute", 
 
 
 class Row(NamedTuple):
-    """A named value that differs; None for a run that does not have it.
-
-    Attributes:
-        name: Its name.
-        a: The value in the first run.
-        b: The value in the second.
-    """
+    """A named value that differs between two runs; None for a run that does not have it."""
 
     name: str
     a: Any
@@ -94,12 +88,9 @@ def _params(
         if values[0] == values[1]:
             continue
         autos = [name in own and own[name] is None for own in given]
-        alike = len({_auto(value) for value in values}) == 1
-        digits = 17 if all(autos) and alike else 6
-        yield Row(
-            f"param {name}",
-            *(_auto(v, digits) if auto else v for v, auto in zip(values, autos, strict=True)),
-        )
+        digits = 17 if all(autos) and len(set(map(_auto, values))) == 1 else 6
+        shown = (_auto(v, digits) if auto else v for v, auto in zip(values, autos, strict=True))
+        yield Row(f"param {name}", *shown)
 
 
 def _auto(value: Any, digits: int = 6) -> str:

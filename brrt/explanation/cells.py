@@ -3,14 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.events import Events, Kind
 from brrt.robots import Robot
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from brrt.worlds.arrays import Bools, Floats, Ints
 
 
 class CellSummary:
@@ -23,7 +19,7 @@ class CellSummary:
         self._estimate = np.zeros(0)
         self.moves = 0
 
-    def write(self, events: Events) -> Flags:
+    def write(self, events: Events) -> Bools:
         """Take a batch; return which of its expansions are the first of their cells."""
         expanded, raised, moves = (events[k] for k in (Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE))
         cells = [np.asarray(table["cell"], np.int64) for table in (expanded, raised, moves)]
@@ -55,7 +51,7 @@ class CellSummary:
         """Configurations of the expanded cells, shape (m, dof)."""
         return self._q[self._expansions > 0]
 
-    def find(self, cell: Ints) -> tuple[Floats, Flags]:
+    def find(self, cell: Ints) -> tuple[Floats, Bools]:
         """Return the configurations of cells that were expanded, shape (m, dof), and which were."""
         known = (cell >= 0) & (cell < len(self._expansions))
         known[known] = self._expansions[cell[known]] > 0

@@ -5,17 +5,15 @@ from dataclasses import dataclass
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.explanation.places import coarse
 from brrt.explanation.summary import RunSummary
 from brrt.robots import Polygon, Robot
+from brrt.worlds.arrays import Floats
 from brrt.worlds.convex import inscribed
 from brrt.worlds.free_space import connected
 from brrt.worlds.narrow_passage import Passage, max_width, narrowest_passage
 from brrt.worlds.world import World
-
-Floats = NDArray[np.float64]
 
 _PROOF = (1 << 16, 1 << 18)
 """Cells of the lattices that bound the width of every path, tried in this order."""

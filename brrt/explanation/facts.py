@@ -4,7 +4,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.digits import digits_within
 from brrt.events import Reason, Source
@@ -16,8 +15,7 @@ from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
-
-Floats = NDArray[np.float64]
+from brrt.worlds.arrays import Floats, Ints
 
 _TENTHS = 10
 
@@ -269,7 +267,7 @@ def _approach(
     return Approach(far, start, q, node, iteration, since, hit)
 
 
-def _reached(summary: RunSummary) -> tuple[Floats, NDArray[np.int64]]:
+def _reached(summary: RunSummary) -> tuple[Floats, Ints]:
     """Return what the trees reached, and in which iterations; 0 for cells, which keep none."""
     if not summary.trees:
         q = summary.cells.q

@@ -4,17 +4,15 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.collision.motions import Obstacles, first_hits
 from brrt.digits import digits_within, join_numbers
 from brrt.explanation.summary import RunSummary
 from brrt.robots import Robot
+from brrt.worlds.arrays import Floats, Ints
 from brrt.worlds.free_space import occupied
 from brrt.worlds.rasterize import Raster
 from brrt.worlds.world import World
-
-Floats = NDArray[np.float64]
 
 _CELLS = {2: 256, 3: 512}
 """Coarse cells, in 2D and 3D: 16 x 16, 8 x 8 x 8."""
@@ -142,7 +140,7 @@ class Places:
         middle = np.mean(lattice.corners(most), axis=0)
         return Spot(middle.tolist(), lattice.cell.tolist(), float(counts.max() / len(cell)))
 
-    def coverage(self, q: Floats, iteration: NDArray[np.int64], last: int) -> Coverage | None:
+    def coverage(self, q: Floats, iteration: Ints, last: int) -> Coverage | None:
         """Measure what part of the free space was reached; None for robots without a position.
 
         Args:

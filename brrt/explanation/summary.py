@@ -3,16 +3,13 @@
 from collections import Counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status, Table, table_dtype
 from brrt.explanation.cells import CellSummary
 from brrt.replay.metrics import Metrics
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from brrt.worlds.arrays import Floats, Ints
 
 MOST = 10_000
 """Rejections whose geometry is examined, evenly spread over the run."""

@@ -1,15 +1,9 @@
 """Costs of nodes of a tree that rewires, each at a moment of its own, by the way up to the root."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.errors import LogError
-from brrt.replay.tree_fold import TreeChanges
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.signedinteger[Any]]
+from brrt.replay.tree_fold import Flags, Floats, Ints, TreeChanges
 
 _CHUNK = 1 << 14
 """Nodes whose ancestors are looked up at once."""
@@ -25,7 +19,7 @@ class CostHistory:
             join as roots.
     """
 
-    def __init__(self, changes: TreeChanges, length: Floats, valid: NDArray[np.bool_]) -> None:
+    def __init__(self, changes: TreeChanges, length: Floats, valid: Flags) -> None:
         self._changes, self._length, m = changes, length, len(changes.seq)
         # The changes of each node, oldest first, under keys that rise.
         rows = np.flatnonzero(valid | changes.joins)

@@ -5,18 +5,15 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brrt.collision.motions import Obstacles, first_hits
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Source, Stage, Table
 from brrt.replay.cost_history import CostHistory
 from brrt.replay.forest import Tree, forest
-from brrt.replay.tree_fold import TreeChanges
+from brrt.replay.tree_fold import Floats, TreeChanges
 from brrt.robots import Robot
 from brrt.worlds.world import World
-
-Floats = NDArray[np.float64]
 
 _NAMES = {0: "start", 1: "goal"}
 

@@ -1,12 +1,11 @@
 """The table of trees: how many nodes and leaves, how deep, and the greatest cost."""
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections import Counter
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Table
+from brrt.events import Events, Kind
 from brrt.replay.forest import check_numbers, check_verdicts, depth_of, final_costs, leaves_of
 from brrt.replay.tree_fold import Distance, TreeChanges, of_tree, trees_in
 
@@ -34,7 +33,8 @@ class TreeStats:
 
     def __init__(self, distance: Distance) -> None:
         self._distance = distance
-        self._trees: dict[int, _Columns] = {}
+        self._nodes: Counter[int] = Counter()
+        self._parts: dict[int, list[tuple[Any, ...]]] = {}  # columns, batch by batch
 
     def write(self, events: Events) -> None:
         """Take a batch.
@@ -43,10 +43,16 @@ class TreeStats:
             LogError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a node gets a parent
                 that does not exist, or is rewired before it exists.
         """
-        edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
-        for number in trees_in(edges, rewires):
-            tree = self._trees.setdefault(number, _Columns(number))
-            tree.write(*(of_tree(table, number) for table in (edges, rewires)))
+        for tree in trees_in(events[Kind.EDGE], events[Kind.REWIRE]):
+            edges, rewires = (of_tree(events[kind], tree) for kind in (Kind.EDGE, Kind.REWIRE))
+            nodes = self._nodes[tree]
+            check_numbers(edges, tree, nodes)
+            changes = TreeChanges.of(edges, rewires, nodes)
+            check_verdicts(changes, changes.existence(nodes))
+            self._nodes[tree] += len(edges)
+            kept = (edges[name].copy() for name in ("parent", "cost", "q"))
+            rewired = np.stack([rewires["node"], rewires["parent"]], axis=1)
+            self._parts.setdefault(tree, []).append((*kept, rewired))
 
     def figures(self) -> list[TreeFigures]:
         """Return the row of each tree.
@@ -54,36 +60,15 @@ class TreeStats:
         Raises:
             LogError: A node is its own ancestor.
         """
-        return [self._trees[number].figures(self._distance) for number in sorted(self._trees)]
-
-
-@dataclass(slots=True)
-class _Columns:
-    """Columns of a tree's edges and rewires, batch by batch."""
-
-    number: int
-    nodes: int = 0
-    parents: list[NDArray[np.int32]] = field(default_factory=list)
-    costs: list[NDArray[np.float64]] = field(default_factory=list)
-    places: list[NDArray[np.float64]] = field(default_factory=list)
-    rewires: list[NDArray[np.int32]] = field(default_factory=list)
-
-    def write(self, edges: Table, rewires: Table) -> None:
-        """Take the tree's events of a batch."""
-        check_numbers(edges, self.number, self.nodes)
-        changes = TreeChanges.of(edges, rewires, self.nodes)
-        check_verdicts(changes, changes.existence(self.nodes))
-        self.nodes += len(edges)
-        for column, name in ((self.parents, "parent"), (self.costs, "cost"), (self.places, "q")):
-            column.append(edges[name].copy())
-        self.rewires.append(np.stack([rewires["node"], rewires["parent"]]))
-
-    def figures(self, distance: Distance) -> TreeFigures:
-        """Return the row of the table."""
-        parent, cost = np.concatenate(self.parents), np.concatenate(self.costs)
-        node, new = np.concatenate(self.rewires, axis=1)
-        if len(node):
-            parent[node] = new  # of several rewires of a node the last one counts
-            cost = final_costs(parent, cost, np.concatenate(self.places), distance)
-        greatest = float(cost.max(initial=-np.inf))
-        return TreeFigures(self.number, len(parent), leaves_of(parent), depth_of(parent), greatest)
+        found = []
+        for tree, parts in sorted(self._parts.items()):
+            parents, costs, places, rewired = zip(*parts, strict=True)
+            parent, cost = np.concatenate(parents), np.concatenate(costs)
+            node, new = np.concatenate(rewired).T
+            if len(node):
+                parent[node] = new  # of several rewires of a node the last one counts
+                cost = final_costs(parent, cost, np.concatenate(places), self._distance)
+            greatest = float(cost.max(initial=-np.inf))
+            shape = len(parent), leaves_of(parent), depth_of(parent)
+            found.append(TreeFigures(tree, *shape, greatest))
+        return found

@@ -124,11 +124,7 @@ def last_complete_iteration(batches: Iterable[Events], limits: Limits) -> tuple[
 
 
 def _branching_point(recording: Recording, limits: Limits) -> tuple[int, Status | None]:
-    """Find the iteration to branch after; see `last_complete_iteration`.
-
-    Raises:
-        BrrtError: There are no events, or planning ended before the instant.
-    """
+    """Find the iteration to branch after; raise if planning ended before the instant."""
     if not any(map(len, recording.batches())):
         raise BrrtError(f"{name_of(recording)}: it has no events to branch after")
     iteration, status = last_complete_iteration(recording.batches(), limits)
@@ -142,11 +138,7 @@ def _branching_point(recording: Recording, limits: Limits) -> tuple[int, Status 
 
 
 def _check_recording(given: Any) -> None:
-    """Raise unless `given` is a recording.
-
-    Raises:
-        BrrtError: It is the name of one, or something else.
-    """
+    """Raise unless `given` is a recording."""
     if isinstance(given, str | PathLike):
         path = str(given)
         raise BrrtError(f"a branch continues a recording: give brrt.read({path!r})")
@@ -162,18 +154,10 @@ def _check_open(
     before: KernelPlanner,
     now: KernelPlanner,
 ) -> None:
-    """Raise if planning cannot continue after an iteration.
+    """Raise if planning cannot continue after an iteration that it `ended` with.
 
-    Args:
-        recording: The recording.
-        iteration: Where the branch is.
-        ended: How planning ended there; None if it did not.
-        before: The planner up to there.
-        now: The planner from there on.
-
-    Raises:
-        BrrtError: The run ended with a path and the new settings stop there too, or with the proof
-            that there is no path.
+    That is so if the run ended with a path and the new settings stop there too, or with the proof
+    that there is no path.
     """
     if ended is Status.SOLVED and now.ends_like(before):
         remedy = f", or {now.resume_hint}" if now.resume_hint else ""
@@ -189,11 +173,7 @@ def _check_open(
 
 
 def _check_budget(recording: Recording, run: KernelRun, t: int, stop: Stop) -> None:
-    """Raise if the budget, which counts from the start of the run, is used up.
-
-    Raises:
-        BrrtError: It is.
-    """
+    """Raise if the budget, which counts from the start of the run, is used up."""
     due = stop.reached(run.counted, t / 1e9)
     if due is Status.TIME_LIMIT:
         spent = f"{t / 1e9:.6g} s have passed of {stop.time_s:g}; give more by --time"
@@ -208,11 +188,7 @@ def _check_budget(recording: Recording, run: KernelRun, t: int, stop: Stop) -> N
 def _changed(
     manifest: Manifest, params: Mapping[str, Any], seed: int | None, settings: Mapping[str, Any]
 ) -> Scenario:
-    """Return the scenario of a run with other settings; those not given stay.
-
-    Raises:
-        BrrtError: A setting cannot change, or a value is wrong.
-    """
+    """Return the scenario of a run with other settings; those not given stay."""
     for name in settings:
         if name in _CHANGEABLE:
             continue
@@ -239,11 +215,7 @@ def _plans_alike(before: Scenario, now: Scenario) -> bool:
 
 
 def _check_fixed(before: KernelPlanner, now: KernelPlanner) -> None:
-    """Raise if a setting differs that is fixed from the start of a run.
-
-    Raises:
-        BrrtError: One does.
-    """
+    """Raise if a setting differs that is fixed from the start of a run."""
     for name in now.fixed_params:
         then, wanted = getattr(before, name), getattr(now, name)
         if wanted != then:

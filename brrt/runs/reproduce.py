@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self, TypeGuard
+from typing import Any, Self
 
-from brrt.comparison.difference import Difference, Event
+from brrt.comparison.difference import Difference
 from brrt.comparison.events import Deviation, first_difference
 from brrt.comparison.settings import Row, differing
 from brrt.errors import BrrtError
@@ -147,9 +147,10 @@ def reproduce(
         made = _first(end.compared, made)
     kept = map(_ended_by_count, _first(end.compared, recording.batches()))
     first, ended = first_difference(kept, made, deviation), end.text()
-    if first is not None and first.left is None and _begins_phase(first.right):
+    extra = first.right if first is not None and first.left is None else None
+    if extra is not None and (extra["kind"], extra.get("status")) == ("phase", "begin"):
         # An interruption between two phases leaves no event: the next phase is missing.
-        ended, first = f"the run was interrupted before the phase {first.right['name']}", None
+        ended, first = f"the run was interrupted before the phase {extra['name']}", None
     versions = tuple(differing("", manifest.made_by, made_by()))
     return Reproduction(end.compared, first, deviation, versions, ended)
 
@@ -225,9 +226,8 @@ class _Ending:
     def text(self) -> str:
         """Say what ended the run from outside; empty if nothing did."""
         if self.interrupted:
-            return "the run was interrupted" + (
-                f" in iteration {self.draws:,}" if self.draws else ""
-            )
+            place = f" in iteration {self.draws:,}" if self.draws else ""
+            return f"the run was interrupted{place}"
         if self.cut:
             place = f"after event {self.events - 1:,}" if self.events else "before any event"
             return f"the recording is cut {place}"
@@ -266,7 +266,3 @@ def _ended_by_count(batch: Events) -> Events:
     for row in changed:
         row["status"] = _BY_COUNT.get((int(row["name"]), int(row["status"])), row["status"])
     return Events(batch.dof, {**batch.tables, Kind.PHASE: changed})
-
-
-def _begins_phase(event: Event | None) -> TypeGuard[Event]:
-    return event is not None and event["kind"] == "phase" and event["status"] == "begin"

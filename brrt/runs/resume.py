@@ -27,12 +27,7 @@ from brrt.scenario.scenario import UNLIMITED, Scenario
 class RecordedRun(Run):
     """A run with the robot, world, start and goal of a recording; the base of runs that repeat it.
 
-    Args:
-        recording: The recording.
-        manifest: Its manifest, or a part of it.
-        scenario: The settings of this run.
-        planner: The planner of this run.
-        batch: Events in a batch at most.
+    `manifest` is the recording's or a part of it; scenario and planner are those of this run.
     """
 
     def __init__(
@@ -117,13 +112,6 @@ def restored(
 ) -> KernelRun:
     """Plan again up to the last shared iteration and return the planner in that state.
 
-    Args:
-        shared: The recorded events up to there.
-        before: The manifest up to there.
-        problem: Robot, world, start and goal.
-        rng: Source of all random draws.
-        log: Numbers and times the events.
-
     Raises:
         BrrtError: An event differs from the recorded one.
     """
@@ -170,12 +158,7 @@ def _versions(then: Mapping[str, str], now: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Continuation:
-    """Continues planning from a restored state; a solver, see `Planner.solve`.
-
-    Attributes:
-        run: The planner in the restored state.
-        shared: The recorded events up to there.
-    """
+    """Continues planning from a restored state after shared events; a solver."""
 
     run: KernelRun
     shared: SharedEvents
@@ -195,11 +178,7 @@ class Continuation:
 
 @dataclass(frozen=True, slots=True)
 class BranchedPlan:
-    """Plans from the start what a manifest with branches states; a solver, see `Planner.solve`.
-
-    Attributes:
-        manifest: The manifest.
-    """
+    """Plans from the start what a manifest with branches states; a solver."""
 
     manifest: Manifest
 

@@ -14,12 +14,14 @@ verdict.
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from brrt.comparison.difference import plain
 from brrt.errors import BrrtError, unknown
 from brrt.scenario.command import command
 from brrt.scenario.scenario import Scenario
@@ -105,11 +107,8 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        names = ("margin", "old", "new", "at_least", "p", "passed", "worst")
-        figures = {
-            each.name: {name: _plain(getattr(each, name)) for name in names}
-            for each in self.metrics
-        }
+        rows = plain([asdict(each) for each in self.metrics])
+        figures = {row.pop("name"): row for row in rows}
         return {
             "name": self.name, "passed": self.passed, "seeds": self.seeds, "alpha": self.alpha,
             "identical": self.identical, "figures": figures,
@@ -149,9 +148,8 @@ def gate(
     numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
     check_question(numbers, alpha, margins)
     old = _metrics_of(against, "the old runs", numbers)
-    return judge(
-        _metrics_of(new, "the new runs", numbers), old, alpha=alpha, name=name, margins=margins
-    )
+    found = _metrics_of(new, "the new runs", numbers)
+    return judge(found, old, alpha=alpha, name=name, margins=margins)
 
 
 def judge(
@@ -163,11 +161,9 @@ def judge(
     pairs = [(old.runs[seed], new.runs[seed]) for seed in seeds]
     both = [seed for seed, (a, b) in zip(seeds, pairs, strict=True) if a["solved"] and b["solved"]]
     share = alpha / (len(margins) + 1)
+    shared = [(old.runs[seed], new.runs[seed]) for seed in both]
     verdicts = [_judge_solved(pairs, share)]
-    verdicts += [
-        _judge_metric(metric, margin, [(old.runs[n], new.runs[n]) for n in both], both, share)
-        for metric, margin in margins.items()
-    ]
+    verdicts += [_judge_metric(*each, shared, both, share) for each in margins.items()]
     _check_solved(verdicts[0], len(seeds), margins, alpha)
     identical = all(a[metric] == b[metric] for a, b in pairs for metric in a.keys() & b.keys())
     scenario = None if new.scenario is None else Scenario.parse(new.scenario)
@@ -177,7 +173,7 @@ def judge(
 def _judge_metric(
     name: str, margin: float, pairs: list[tuple[Any, Any]], seeds: list[int], share: float
 ) -> MetricVerdict:
-    for run in (run for pair in pairs for run in pair):
+    for run in chain(*pairs):
         if name not in run:
             raise unknown("metric", name, run.keys() - {"solved"})
     if not pairs:
@@ -242,11 +238,7 @@ def _fewest_pairs(margins: Mapping[str, Any], alpha: float) -> int:
 def _check_solved(
     solved: MetricVerdict, seeds: int, margins: Mapping[str, Any], alpha: float
 ) -> None:
-    """Check that enough pairs with two solutions are to be expected if nothing has changed.
-
-    Raises:
-        BrrtError: They are too few.
-    """
+    """Raise unless enough pairs with two solutions are to be expected if nothing has changed."""
     least = _fewest_pairs(margins, alpha)
     if margins and solved.old**2 < least * seeds:
         raise BrrtError(
@@ -259,11 +251,9 @@ def _check_problem(new: SeedMetrics, old: SeedMetrics) -> None:
     if new.scenario is None or old.scenario is None:
         return
     for key in PROBLEM:
-        if new.scenario.get(key) != old.scenario.get(key):
-            values = [f"{each.scenario.get(key)!r}" for each in (new, old) if each.scenario]
-            raise BrrtError(
-                f"the runs solve different problems: {key} {values[0]} against {values[1]}"
-            )
+        ours, theirs = new.scenario.get(key), old.scenario.get(key)
+        if ours != theirs:
+            raise BrrtError(f"the runs solve different problems: {key} {ours!r} against {theirs!r}")
 
 
 def _row(each: MetricVerdict, seeds: int) -> str:
@@ -280,7 +270,3 @@ def _row(each: MetricVerdict, seeds: int) -> str:
 
 def _percent(ratio: float) -> str:
     return f"{100 * ratio:+.3g} %" if ratio < 100 else f"x{1 + ratio:.3g}"
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

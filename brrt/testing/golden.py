@@ -28,9 +28,6 @@ Source = Scenario | Run | Recording | Path | str
 def record(source: Source) -> Recording:
     """Return a recording on the logical clock, so that equal runs give equal files.
 
-    Args:
-        source: What to run, or what was recorded, by brrt or by another program as MCAP.
-
     Raises:
         BrrtError: The source is something else, cannot be run or read, or has a time limit.
     """

@@ -45,11 +45,7 @@ class SeedMetrics:
 
     @classmethod
     def of(cls, source: Source, seeds: int | Iterable[int]) -> Self:
-        """Run each seed, one after the other.
-
-        Args:
-            source: What to run.
-            seeds: How many, from 0 on, or which.
+        """Run each seed, one after the other; `seeds` says how many, from 0 on, or which.
 
         Raises:
             BrrtError: The scenario cannot be run, or the function returned something else.
@@ -73,19 +69,15 @@ class SeedMetrics:
         """
         text = read_text(path, "a file of metrics", _MOST_BYTES)
         try:
-            return cls._parse(text)
+            found = parse_json(text, "a file of metrics")
+            if found["schema"] != SCHEMA or found["version"] != VERSION:
+                raise BrrtError(f"not {SCHEMA} of version {VERSION}")  # noqa: TRY301
+            runs = {int(seed): _comparable(seed, run) for seed, run in found["runs"].items()}
+            return cls(runs, found["scenario"], found["made_by"])
         except BrrtError as error:
             raise BrrtError(f"{path}: {error}") from None
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise BrrtError(f"{path}: not a file of metrics: {error!r}") from None
-
-    @classmethod
-    def _parse(cls, text: str) -> Self:
-        found = parse_json(text, "a file of metrics")
-        if found["schema"] != SCHEMA or found["version"] != VERSION:
-            raise BrrtError(f"not {SCHEMA} of version {VERSION}")
-        runs = {int(seed): _comparable(seed, run) for seed, run in found["runs"].items()}
-        return cls(runs, found["scenario"], found["made_by"])
 
     def save(self, path: Path) -> None:
         """Write one line for each seed, so that versions of the file can be compared line by line.
@@ -97,11 +89,10 @@ class SeedMetrics:
         head |= {"made_by": self.made_by, "scenario": self.scenario}
         lines = [f" {json.dumps(k)}: {json.dumps(v)}," for k, v in head.items()]
         runs = ",\n".join(f'  "{seed}": {json.dumps(run)}' for seed, run in self.runs.items())
+        text = "\n".join(["{", *lines, ' "runs": {', runs, " }", "}", ""])
         make_folder_of(path)
         with replacing(path) as unfinished:
-            unfinished.write_text(
-                "\n".join(["{", *lines, ' "runs": {', runs, " }", "}", ""]), "utf-8"
-            )
+            unfinished.write_text(text, "utf-8")
 
     def contains(self, other: Self) -> bool:
         """Whether all metrics of `other` are here, equal to the last bit."""
@@ -114,11 +105,7 @@ class SeedMetrics:
 
 
 def check_repeatable(scenario: Scenario) -> None:
-    """Check that a scenario gives the same run each time.
-
-    Raises:
-        BrrtError: Its budget is a time.
-    """
+    """Raise unless a scenario gives the same run each time: its budget must not be a time."""
     if scenario.time is not None:
         raise BrrtError(
             "a scenario with a time limit ends differently in each run; give iterations instead"
@@ -153,21 +140,16 @@ def _run(source: Source, seed: int) -> Mapping[str, Any]:
 
 
 def _comparable(where: str, found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `solved` and the numbers that do not depend on the machine.
-
-    Raises:
-        BrrtError: One is not a finite number of at least 0.
-    """
+    """Return `solved` and the numbers that do not depend on the machine, which are finite."""
     kept: dict[str, Any] = {"solved": found.get("solved", True) is True}
     if "path_cost" in found and "cost" not in found:
         smoothed = found.get("smoothed_cost")
         found = {"cost": found["path_cost"] if smoothed is None else smoothed, **found}
     for name, value in found.items():
-        if name in ("seed", "solved") or name.endswith("_s"):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or name in ("seed", "solved") or name.endswith("_s"):
             continue
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            kept[name] = value
-    for name, value in kept.items():
+        kept[name] = value
         if not 0 <= value < math.inf:
             raise BrrtError(f"{where}: {name} must be a number from 0 on, or None, not {value!r}")
     return kept

@@ -28,11 +28,7 @@ _INTENDED = f"If this change is intended: {_UPDATE}, and commit it."
 
 
 class _GoldenFiles:
-    """The golden files of a test.
-
-    Args:
-        request: The test's request.
-    """
+    """The golden files of a test."""
 
     def __init__(self, request: pytest.FixtureRequest) -> None:
         self._config, self._node = request.config, request.node.nodeid
@@ -64,14 +60,11 @@ class _GoldenFiles:
 
     def failed(self, path: Path) -> Path:
         """Return where a run that differs from a golden file is kept; folders are the same."""
-        chosen = self._config.getoption("brrt_failed")
-        folder: Path
-        if chosen:
+        folder = self._config.rootpath / ".brrt-failed"
+        if chosen := self._config.getoption("brrt_failed"):
             folder = self._config.invocation_params.dir / chosen
         elif hasattr(self._config, "cache"):
             folder = Path(self._config.cache.mkdir("brrt-failed"))
-        else:
-            folder = self._config.rootpath / ".brrt-failed"
         inside = Path(os.path.relpath(path, self._config.rootpath))
         return folder / (path.name if ".." in inside.parts else inside)
 

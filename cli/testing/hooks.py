@@ -24,11 +24,7 @@ _OUTPUT = "brrt"
 
 
 class SessionHooks:
-    """The hooks of a session.
-
-    Args:
-        config: The session's configuration.
-    """
+    """The hooks of a session."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config, self._usage = config, config.stash[USAGE]

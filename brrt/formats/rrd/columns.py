@@ -57,12 +57,9 @@ def _component(kind: Kind, field: Field) -> str:
 
 def time_columns(rows: Table) -> list[Column]:
     """Return the timelines of events, exact to the nanosecond."""
-    iteration, seq, t = (np.ascontiguousarray(rows[name]) for name in ("iteration", "seq", "t"))
-    return [
-        Column("iteration", pa.array(iteration)),
-        Column("event", pa.array(seq)),
-        Column("t", pa.array(t.view("m8[ns]"))),
-    ]
+    columns = {name: np.ascontiguousarray(rows[column]) for name, column in _TIMELINES.items()}
+    columns["t"] = columns["t"].view("m8[ns]")
+    return [Column(name, pa.array(values)) for name, values in columns.items()]
 
 
 def event_columns(kind: Kind, table: Table) -> list[Column]:
@@ -78,7 +75,7 @@ def event_columns(kind: Kind, table: Table) -> list[Column]:
 
 
 def table_of(kind: Kind, dof: int, batch: Any) -> Table:
-    """Return the events in a record batch of Rerun's, in the order of `seq`.
+    """Return the events in a record batch of Rerun's.
 
     Raises:
         BrrtError: A time or a value is missing, or a column is of another type.
@@ -92,8 +89,6 @@ def table_of(kind: Kind, dof: int, batch: Any) -> Table:
         table[name] = times.cast("int64").to_numpy()
     for field in FIELDS[kind]:
         table[field.name] = from_arrow(field, batch.column(_component(kind, field)), dof)
-    if (np.diff(table["seq"]) <= 0).any():
-        table = table[np.argsort(table["seq"], kind="stable")]
     return table
 
 
@@ -120,10 +115,8 @@ def from_arrow(field: Field, column: Any, dof: int) -> NDArray[Any]:
         if flat.type.list_size != dof:
             raise BrrtError(f"{field.name} has {flat.type.list_size} numbers instead of {dof}")
         values, wanted = flat.flatten(), rows * dof
-    elif field.type == "q[]":
-        values, wanted = flat, len(flat)
     else:
-        values, wanted = flat, rows
+        values, wanted = flat, len(flat) if field.type == "q[]" else rows
     kind = pa.float64() if field.type in ("q", "q[]") else pa.from_numpy_dtype(field.type)
     if values.type != kind or values.null_count or len(values) != wanted:
         raise BrrtError(f"{field.name} has {len(values)} values of {values.type} in {rows} rows")

@@ -144,13 +144,7 @@ def _texts(path: Path, store: LazyStore) -> dict[str, dict[str, str]]:
 def _batches(
     path: Path, manifest: Manifest, head: Mapping[str, str], count: int
 ) -> Iterator[Events]:
-    """Yield the events in order.
-
-    Args:
-        path: The file.
-        manifest: The run's.
-        head: The texts that the manifest was read from.
-        count: How many events the file says that it has.
+    """Yield the `count` events that the file states, in order; `head` are the manifest's texts.
 
     Raises:
         RecordingError: The file is damaged, or another one than when it was opened.
