@@ -52,6 +52,8 @@ def _rows(m: Mapping[str, Any], branches: Iterable[str]) -> Iterator[tuple[str, 
 
 def _outcome(m: Mapping[str, Any]) -> str:
     """Describe whether there is a path, and what ended the run if that was not the path."""
+    if m["status"] == "running":
+        return f"{'solved' if m['solved'] else 'not solved yet'}, still planning at this point"
     if m["solved"]:
         return "solved" if m["status"] == "solved" else f"solved, ended by: {m['status']}"
     if m["status"] == "no path":

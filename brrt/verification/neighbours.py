@@ -13,8 +13,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Distance = Callable[[Floats, Floats], Floats]
 
-_AT_ONCE = 1 << 18
-"""Distances that are measured at once, at least."""
+_AT_ONCE = 1 << 14
+"""Distances that are measured at once, at least; more leave the cache of the processor."""
 
 _SLACK = 1e-9
 _GOLDEN = 0.6180339887498949

@@ -108,3 +108,19 @@ def test_cut_and_foreign_files(brrt: Command) -> None:
         Path(name).write_text(text)
         assert brrt("replay", name).code == 2
     assert "No such file" in brrt("replay", "none.mcap").err
+
+
+def test_outcome_before_the_end(brrt: Command) -> None:
+    """A run that is cut, or replayed up to an instant, has not failed; the JSON says running."""
+    brrt("plan", "--planner", "rrt-star", "--iterations", "2000", "--out", "a.mcap")
+    assert "solved, ended by: iteration limit" in brrt("replay", "a.mcap").out
+    early = brrt("replay", "a.mcap", "--at-iteration", "3")
+    assert "outcome  not solved yet, still planning at this point" in early.out
+    late = brrt("replay", "a.mcap", "--at-iteration", "1990")
+    assert "solved, still planning at this point" in late.out
+    assert brrt("replay", "a.mcap", "--at-iteration", "3", "--json").json["status"] == "running"
+    whole = Path("a.mcap").read_bytes()
+    Path("b.mcap").write_bytes(whole[: len(whole) // 20])
+    cut = brrt("replay", "b.mcap")
+    assert cut.code == 0
+    assert "not solved yet, still planning at this point" in cut.out
