@@ -163,6 +163,17 @@ def with_private(*written: McapRecord) -> bytes:
     return b"".join(unknown + record_bytes(record) for record in written)
 
 
+def indexes(parts: Parts) -> list[MessageIndex]:
+    """Return where the messages of each channel are in a chunk of nothing else."""
+    found: dict[int, MessageIndex] = {}
+    at = 0
+    for message in parts.messages:
+        index = found.setdefault(message.channel_id, MessageIndex(message.channel_id, []))
+        index.records.append((message.log_time, at))
+        at += len(record_bytes(message))
+    return list(found.values())
+
+
 def by_channel(parts: Parts) -> list[Message]:
     """Return the messages ordered by channel."""
     return sorted(parts.messages, key=lambda m: (m.channel_id, m.sequence))
@@ -172,6 +183,9 @@ FORMS: dict[str, Callable[[Parts], bytes]] = {
     "unchunked": lambda p: file_of(p, record_bytes(*p.declared, *p.messages)),
     "declarations before the chunk": lambda p: file_of(
         p, record_bytes(*p.declared), chunk(*p.messages)
+    ),
+    "declarations before the chunk, and an index": lambda p: file_of(
+        p, record_bytes(*p.declared), chunk(*p.messages), record_bytes(*indexes(p))
     ),
     "schemas before, channels in the chunk": lambda p: file_of(
         p, record_bytes(*p.schemas.values()), chunk(*p.channels.values(), *p.messages)

@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Table
 from brrt.formats.integrity import MOST_BYTES, Numbering
-from brrt.formats.mcap.messages import ENCODINGS, HEAD_BYTES, TOPICS, Channel, Layout
+from brrt.formats.mcap.messages import ENCODINGS, HEAD_BYTES, MESSAGE, TOPICS, Channel, Layout
 from brrt.formats.mcap.records import parse
 from brrt.formats.ordering import Waiting, in_order
 
 Index = Mapping[int, NDArray[np.uint64]]
 """For each channel, where its messages begin in a chunk."""
 
-DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+DECLARATIONS = (int(Opcode.SCHEMA), int(Opcode.CHANNEL))
 _MOST_DECLARED = 1 << 24
 """Bytes of all schemas and channels that differ; there are 65,535 of each at most."""
-_MOST_WALKED, _PACKED = 4_000_000, 8
-"""Records that are no events, in chunks without an index: a second or two in any case, and one for
-so many bytes of the file."""
+_MOST_WALKED, _PACKED = 1_000_000, 8
+"""Records that are no events, which are read one by one: a second in any case, and one more record
+for so many bytes of the file."""
 _MOST_WAITING = MOST_BYTES
 """Bytes of events that wait for earlier ones."""
 
@@ -48,7 +48,8 @@ class ChunkDecoder:
         self._dof, self._epoch_ns = dof, epoch_ns
         self._declared: dict[tuple[int, bytes], bytes] = {}
         self._channels: dict[int, Channel] = {}
-        self._declared_bytes = self._walked = self._packed = 0
+        self._declared_bytes = self._walked = 0
+        self._most = _MOST_WALKED
         self._waiting, self._waiting_bytes = Waiting(dof), 0
         self._last_t: int | None = None
 
@@ -67,7 +68,7 @@ class ChunkDecoder:
         Raises:
             BrrtError: They are not what the schemas say, or cannot be the next events.
         """
-        self._packed += packed
+        self._most += packed // _PACKED
         begin = self._declare_first(raw)
         if not self._waiting.count:
             try:
@@ -149,7 +150,7 @@ class ChunkDecoder:
                 tables.append((channel.kind, table))
                 size += used
             elif number not in self.kinds:
-                raise BrrtError(f"a message of channel {number}, which is not declared before it")
+                raise _undeclared(number)
         return tables, size
 
     def _declare_first(self, raw: bytes) -> int:
@@ -157,39 +158,38 @@ class ChunkDecoder:
         at = 0
         while at + 9 <= len(raw) and raw[at] in DECLARATIONS:
             end: int = at + 9 + struct.unpack_from("<Q", raw, at + 1)[0]
-            self._count(1)
+            self._count()
             self._declare(raw[at], raw[at + 9 : end])
             at = end
         return at
 
-    def _count(self, number: int) -> None:
-        """Count records that are no events: an empty one is packed into less than a byte."""
-        self._walked += number
-        most = _MOST_WALKED + self._packed // _PACKED
-        if self._walked > most:
-            raise BrrtError(f"{most:,} records that are no events")
+    def _count(self) -> None:
+        """Count a record that is no event: an empty one is packed into less than a byte."""
+        self._walked += 1
+        if self._walked > self._most:
+            raise BrrtError(f"{self._most:,} records that are no events")
 
     def _walk(self, raw: bytes, at: int) -> Index:
-        """Index the messages of a chunk by going from one record to the next."""
+        """Index the messages of our channels by going from one record to the next."""
         found: dict[int, list[int]] = {}
         while at < len(raw):
-            self._count(1)
             if at + 9 > len(raw):
                 raise BrrtError("a record reaches out of its chunk")
             opcode, length = struct.unpack_from("<BQ", raw, at)
-            end = at + 9 + length
-            if opcode == Opcode.MESSAGE:
-                if length < HEAD_BYTES - 9 or end > len(raw):
+            begin, at = at, at + 9 + length
+            if opcode == MESSAGE:
+                if length < HEAD_BYTES - 9 or at > len(raw):
                     raise BrrtError("a message reaches out of its chunk")
-                found.setdefault(raw[at + 9] | raw[at + 10] << 8, []).append(at)
-            elif opcode in DECLARATIONS:
-                self._declare(opcode, raw[at + 9 : end])
-            at = end
-        for channel, places in found.items():
-            if channel in self._channels:
-                self._count(-len(places))
-            else:
-                self.foreign += len(places)
+                number = raw[begin + 9] | raw[begin + 10] << 8
+                if number in self._channels:
+                    found.setdefault(number, []).append(begin)
+                    continue
+                if number not in self.kinds:
+                    raise _undeclared(number)
+                self.foreign += 1
+            self._count()
+            if opcode in DECLARATIONS:
+                self._declare(opcode, raw[begin + 9 : at])
         return {channel: np.array(places, np.uint64) for channel, places in found.items()}
 
     def _declare(self, opcode: int, data: bytes) -> None:
@@ -233,6 +233,10 @@ class ChunkDecoder:
             return Layout.parse(schema.data.decode(errors="replace"))
         except (BrrtError, ValueError) as error:
             raise BrrtError(f"the schema of {channel.topic}: {error}") from None
+
+
+def _undeclared(channel: int) -> BrrtError:
+    return BrrtError(f"a message of channel {channel}, which is not declared before it")
 
 
 def _as_events(dof: int, tables: list[tuple[Kind, Table]]) -> Events:

@@ -44,7 +44,11 @@ class Frame:
 
     def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where points, shape (..., dim), are drawn."""
-        return (points - self.origin) * self.scale
+        return points if self._as_is else (points - self.origin) * self.scale
+
+    @cached_property
+    def _as_is(self) -> bool:
+        return self.scale == 1 and not self.origin.any()
 
     def places(self, values: Any, robot: Robot) -> NDArray[np.float32]:
         """Return where configurations, shape (n, dof), are drawn, shape (n, dim)."""
@@ -55,7 +59,7 @@ class Frame:
     def drawn(self) -> World:
         """The world as it is drawn."""
         world, scale = self.world, self.scale
-        if scale == 1 and not self.origin.any():
+        if self._as_is:
             return world
         values: dict[str, Any] = {
             name: None if point is None else self.points(point)
