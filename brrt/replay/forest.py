@@ -100,7 +100,9 @@ class Tree:
 
 def leaves_of(parent: Ints) -> int:
     """Count the nodes without children; `parent` has shape (n,)."""
-    return int((np.bincount(parent[parent >= 0], minlength=len(parent)) == 0).sum())
+    has_child = np.zeros(len(parent), np.bool_)  # `np.bincount` takes twice as long
+    has_child[parent[parent >= 0]] = True
+    return int((~has_child).sum())
 
 
 def depth_of(parent: Ints) -> int:

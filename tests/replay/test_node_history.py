@@ -181,39 +181,29 @@ def test_node_on_the_command_line(brrt: Command) -> None:
 
 
 @pytest.mark.parametrize(
-    ("args", "message"),
+    ("planner", "args", "message"),
     [
-        (["--node", "999"], "tree 0 (start) has the nodes 0 to "),
+        ("rrt", "--node 999", "tree 0 (start) has the nodes 0 to "),
+        ("rrt", "--node -1", "node -1 does not exist at this instant: tree 0 (start) has"),
         (
-            ["--node", "-1"],
-            "node -1 does not exist at this instant: tree 0 (start) has",
-        ),
-        (
-            ["--node", "1", "--tree", "goal"],
+            "rrt",
+            "--node 1 --tree goal",
             "tree 1 (goal) has no nodes at this instant; trees with nodes: tree 0 (start)",
         ),
-        (["--node", "1", "--tree", "gaol"], "--tree must be start, goal or the number of a tree"),
-        (["--tree", "goal"], "add --node"),
-        (["--node", "1", "--text"], "--node excludes --text"),
+        ("rrt", "--node 1 --tree gaol", "--tree must be start, goal or the number of a tree"),
+        ("rrt", "--tree goal", "add --node"),
+        ("rrt", "--node 1 --text", "--node excludes --text"),
+        ("a-star", "--node 1000000", "have the numbers 0 to "),
+        ("a-star", "--node 1 --tree 1", "has cells and no trees; give no tree"),
     ],
 )
-def test_bad_nodes_are_one_line(args: list[str], message: str, brrt: Command) -> None:
-    """Exit code 2 and one line that names what exists."""
-    brrt("plan", "--out", "a.mcap", "--seed", 3)
-    done = brrt("replay", "a.mcap", *args)
+def test_bad_nodes_are_one_line(planner: str, args: str, message: str, brrt: Command) -> None:
+    """Exit code 2 and one line that names what exists: nodes, or cells of a lattice."""
+    brrt("plan", "--planner", planner, "--world", "empty2d:size=5", "--out", "a.mcap")
+    done = brrt("replay", "a.mcap", *args.split())
     assert (done.code, done.out) == (2, "")
     assert message in done.err
     assert done.err.count("\n") == 1
-
-
-def test_bad_cells_are_one_line(brrt: Command) -> None:
-    """The same on a lattice, which has no trees."""
-    brrt("plan", "--planner", "a-star", "--world", "empty2d:size=5", "--out", "a.mcap")
-    done = brrt("replay", "a.mcap", "--node", 10**6)
-    assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "have the numbers 0 to " in done.err
-    done = brrt("replay", "a.mcap", "--node", 1, "--tree", 1)
-    assert "has cells and no trees; give no tree" in done.err
 
 
 def test_rejections_left_out_add_up(brrt: Command) -> None:
