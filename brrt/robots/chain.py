@@ -13,6 +13,7 @@ from brrt.errors import BrrtError
 from brrt.robots.angles import angle_differences, angle_distances, rotation, wrap_angles
 from brrt.robots.robot import Floats, Robot, blocked, check_fields, numbers_of, plane_only
 from brrt.settings import param
+from brrt.worlds.arrays import check_lengths
 from brrt.worlds.convex import convex_polygon, gap, touching_pair
 from brrt.worlds.world import World
 
@@ -107,7 +108,9 @@ class Chain(Robot):
 
     def _equal_joints(self, side: float) -> tuple[Joint, ...]:
         length = self.length or _AUTO_REACH * side / self.links
-        half = (_AUTO_WIDTH * length if self.width is None else self.width) / 2
+        width = _AUTO_WIDTH * length if self.width is None else self.width
+        check_lengths("robot: length and width of links", np.array([length, width]))
+        half = width / 2
         outline = [[0, -half], [length, -half], [length, half], [0, half]]
         link = convex_polygon("robot: link", outline if half else [[0, 0], [length, 0]])
         limits = None if self.wrap else (-self.limit, self.limit)

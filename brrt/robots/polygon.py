@@ -11,6 +11,7 @@ from brrt.errors import BrrtError
 from brrt.robots.angles import angle_differences, angle_distances, rotation, wrap_angles
 from brrt.robots.robot import Floats, Robot, blocked, check_fields, plane_only
 from brrt.settings import param
+from brrt.worlds.arrays import check_lengths
 from brrt.worlds.convex import convex_polygon
 from brrt.worlds.world import World
 
@@ -40,6 +41,7 @@ class Polygon(Robot):
             BrrtError: A part is not a convex polygon.
         """
         Robot.__post_init__(self)
+        check_lengths("robot: length and width", np.array([self.length, self.width]))
         x, y = self.length / 2, self.width / 2
         parts = self.parts or ([[-x, -y], [x, -y], [x, y], [-x, y]],)
         checked = tuple(convex_polygon(f"robot: polygons[{i}]", p) for i, p in enumerate(parts))

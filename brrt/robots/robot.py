@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from brrt.digits import tell_apart
 from brrt.errors import BrrtError
 from brrt.settings import Settings
+from brrt.worlds.arrays import GREATEST
 from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
@@ -153,7 +154,7 @@ class Robot(Settings):
 
 
 def numbers_of(name: str, values: Any, count: int) -> tuple[float, ...]:
-    """Read `count` finite numbers.
+    """Read `count` finite numbers up to `GREATEST`.
 
     Raises:
         BrrtError: The values are something else.
@@ -163,7 +164,7 @@ def numbers_of(name: str, values: Any, count: int) -> tuple[float, ...]:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         array = np.array(np.nan)
-    if array.shape != (count,) or not np.isfinite(array).all():
+    if array.shape != (count,) or not (np.abs(array) <= GREATEST).all():
         text = repr(values)
         text = text if len(text) <= 60 else text[:57] + "..."
         raise BrrtError(f"robot: {name} must be {what}, not {text}")

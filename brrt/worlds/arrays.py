@@ -14,6 +14,25 @@ Bools = NDArray[np.bool_]
 GREATEST = 1e100
 """Largest absolute value of a coordinate: kernels square coordinates, which must not overflow."""
 
+LEAST = 1 / GREATEST
+"""Least length but 0: the squares of lengths must not underflow either."""
+
+
+def check_lengths(name: str, lengths: Floats) -> None:
+    """Check that lengths which are not 0 have squares that do not underflow.
+
+    Args:
+        name: What they are, for messages ("world: sides of boxes").
+        lengths: Any shape, none below 0.
+
+    Raises:
+        BrrtError: One is between 0 and `LEAST`.
+    """
+    small = (lengths > 0) & (lengths < LEAST)
+    if small.any():
+        least = lengths[small].min()
+        raise BrrtError(f"{name} must be at least {LEAST:g}, not {least:g}; choose a smaller unit")
+
 
 def read_numbers(name: str, values: Any, what: str, shape: tuple[int | None, ...]) -> Floats:
     """Convert numbers from JSON or Python to an array.

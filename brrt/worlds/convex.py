@@ -8,7 +8,7 @@ import numpy as np
 
 from brrt.digits import digits_within, join_numbers
 from brrt.errors import BrrtError
-from brrt.worlds.arrays import Floats, read_numbers
+from brrt.worlds.arrays import LEAST, Floats, check_lengths, read_numbers
 
 _ROUNDING = 1e-9
 """A vertex of a convex polygon may be concave by this sine of its angle: files are rounded."""
@@ -44,6 +44,7 @@ def convex_polygon(name: str, values: Any) -> Floats:
     vertices = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
     if len(vertices) < 2:
         raise BrrtError(f"{name} must have 2 or more different vertices; these are all the same")
+    check_lengths(f"{name}: the size", np.ptp(vertices, axis=0).max(keepdims=True))
     return vertices if len(vertices) == 2 else _hull_of_convex(name, vertices)
 
 
@@ -70,6 +71,7 @@ def convex_polygons(name: str, values: Sequence[Any]) -> tuple[Floats, ...]:
         cross, lengths, angles = _turns(several)
         # Clearly convex and counter-clockwise: nothing to drop, reverse or refuse.
         clear = (cross > _ROUNDING * lengths).all(axis=1) & (np.abs(angles - 2 * np.pi) < 1)
+        clear &= np.ptp(several, axis=1).max(axis=1) >= LEAST
         for i, polygon in zip(np.flatnonzero(clear).tolist(), several[clear], strict=True):
             found[which[i]] = polygon
     return tuple(

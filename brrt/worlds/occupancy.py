@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from brrt.errors import BrrtError
-from brrt.worlds.arrays import Bools, Floats, Ints, read_numbers
+from brrt.worlds.arrays import Bools, Floats, Ints, check_lengths, read_numbers
 from brrt.worlds.convex import gap, rectangle
 
 MOST_CELLS = 1 << 26
@@ -61,6 +61,7 @@ class Grid:
             object.__setattr__(self, name, float(number))
         if self.resolution <= 0:
             raise BrrtError(f"grid: resolution must be above 0, not {self.resolution:g}")
+        check_lengths("grid: resolution", np.array([self.resolution]))
         read_numbers("grid: corners", self.corners, "", (4, 2))
 
     @property

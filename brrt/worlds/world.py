@@ -12,7 +12,7 @@ import numpy as np
 from brrt.digits import digits_within, join_numbers, tell_apart
 from brrt.errors import BrrtError, unknown
 from brrt.files import parse_json, replacing
-from brrt.worlds.arrays import Floats, read_numbers
+from brrt.worlds.arrays import Floats, check_lengths, read_numbers
 from brrt.worlds.convex import convex_polygons, gap, rectangle
 from brrt.worlds.occupancy import Grid
 
@@ -107,6 +107,7 @@ class World:
                 f"world: each upper bound must be above its lower bound, but {'xyz'[i]} is from "
                 f"{bounds}"
             )
+        check_lengths("world: sides of the bounds", self.upper - self.lower)
         crossed = (self.boxes[:, :dim] > self.boxes[:, dim:]).any(axis=1)
         if crossed.any():
             i = int(crossed.argmax())
@@ -116,6 +117,7 @@ class World:
             i = int((self.balls[:, dim] < 0).argmax())
             radius = self.balls[i, dim]
             raise BrrtError(f"world: balls[{i}]: the radius must be at least 0, not {radius:g}")
+        check_lengths("world: radii of balls", self.balls[:, dim])
         if not isinstance(self.y_down, bool):
             raise BrrtError("world: y_down must be true or false")
         if self.grid is not None and dim != 2:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.worlds import GENERATORS, World, load_world, make_world
+from brrt.worlds.arrays import LEAST
 
 Floats = NDArray[np.float64]
 
@@ -51,10 +52,10 @@ def worlds(draw: st.DrawFn) -> World:
     dim = draw(st.sampled_from([2, 3]))
     number = st.floats(-1e99, 1e99)
     point = st.lists(number, min_size=dim, max_size=dim)
-    ball = st.tuples(point, st.floats(0, 1e100)).map(lambda it: [*it[0], it[1]])
+    ball = st.tuples(point, st.just(0.0) | st.floats(LEAST, 1e100)).map(lambda it: [*it[0], it[1]])
     box = st.tuples(point, point).map(lambda it: np.sort(it, axis=0).ravel())
     low, high = np.sort([draw(point), draw(point)], axis=0)
-    high = np.maximum(high, np.nextafter(low, np.inf))
+    high = np.maximum(high, np.nextafter(low + 2 * LEAST, np.inf))
     start, goal = (draw(st.none() | point.map(np.array)) for _ in range(2))
     balls, boxes = draw(st.lists(ball, max_size=3)), draw(st.lists(box, max_size=3))
     return World("w", low, high, np.array(balls), np.array(boxes), start, goal)

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from brrt.digits import against_limits
 from brrt.errors import BrrtError
 from brrt.settings import Settings, param
-from brrt.worlds.arrays import Floats
+from brrt.worlds.arrays import Floats, check_lengths, read_numbers
 from brrt.worlds.free_space import connected
 from brrt.worlds.generators.clearing import clear_ends
 from brrt.worlds.world import World
@@ -66,6 +66,14 @@ class Generator(Settings):
 
     size: float = param(100.0, "side of the map", above=0)
     connected: bool = param(False, "guarantee a path from start to goal for a point")
+
+    def __post_init__(self) -> None:
+        """Check the lengths, which are above 0, before others follow from them."""
+        Settings.__post_init__(self)
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.metadata.get("above") == 0 and value is not None:
+                check_lengths(f.name, read_numbers(f.name, value, "a number", ()))
 
     @abstractmethod
     def candidates(self) -> Iterator[ObstacleSet]:

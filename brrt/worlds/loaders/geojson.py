@@ -12,7 +12,7 @@ import numpy as np
 from brrt.errors import BrrtError
 from brrt.files import parse_json
 from brrt.settings import param
-from brrt.worlds.arrays import Floats, read_numbers
+from brrt.worlds.arrays import Floats, check_lengths, read_numbers
 from brrt.worlds.loaders.loader import Loader, read_world_text
 from brrt.worlds.world import World
 
@@ -160,6 +160,7 @@ class _Geometries:
             points = _positions(what, ring, (2, 3, 4))[:, :2]
             if len(points) < 4 or (points[0] != points[-1]).any():
                 raise BrrtError(f"{what} must have 4 or more positions and end where it begins")
+            check_lengths(f"{what}: the size", np.ptp(points, axis=0).max(keepdims=True))
             self._vertices += len(points)
             rings.append(np.ascontiguousarray(points))
         if self._vertices > _MOST_VERTICES:
