@@ -101,6 +101,22 @@ def test_closed_polygons_and_open_holes(tmp_path: Path) -> None:
         assert (world.obstacle_at([x, y]) is not None) == hit
 
 
+def test_a_bbox_across_the_antimeridian(tmp_path: Path) -> None:
+    """The message names the two longitudes, and no margin is advised, or accepted."""
+    data = of("Polygon", [SQUARE])
+
+    def message(box: list[int], margin: str = "") -> str:
+        return refused(lambda: loaded(data | {"bbox": box}, tmp_path, margin))
+
+    for margin in ("", ":margin=1", ":margin=200"):
+        crossed = message([177, -20, -178, -16], margin)
+        assert "bbox: west 177 is greater than east -178; coordinates are used as plane" in crossed
+    for box in ([0, 5, 4, 3], [0, 5, 0, 4, 3, 9]):
+        assert "bbox: south 5 is greater than north 3; swap them" in message(box)
+    assert "the bounds have no area; give" in message([0, 5, 4, 5])
+    assert loaded(data | {"bbox": [0, 5, 4, 5]}, tmp_path, ":margin=1").upper.tolist() == [5, 6]
+
+
 def test_all_kinds(tmp_path: Path) -> None:
     """Collections of features and geometries, multipolygons, the query, ignored types."""
     far = [[x + 10, y] for x, y in SQUARE]
@@ -173,7 +189,7 @@ BOW = [[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]
         (feature(of("Point", [1, "x"]), role="goal"), ": goal must be positions of"),
         (feature(of("Point", [1, 2]), role="goal"), ": the bounds have no area; give "),
         (of("Polygon", [SQUARE]) | {"bbox": [0, 0, 1]}, ": bbox must be positions of 4 or 6"),
-        (of("Polygon", [SQUARE]) | {"bbox": [0, 0, -1, 1]}, ": the bounds have no area"),
+        (of("Polygon", [SQUARE]) | {"bbox": [0, 0, 0, 1]}, ": the bounds have no area"),
         (of("Polygon", [SQUARE * 60_000]), ": more than 200,000 vertices; simplify the polygons"),
         (of("Polygon", [SQUARE * 7000]), ": more than 30,000 vertices; simplify the polygon"),
     ],

@@ -165,6 +165,28 @@ def test_strange_fields_are_said(tmp_path: Path) -> None:
     assert load_world(path).notes == (f"{path}:7: 'modus' is not a field of a map; ignored",)
 
 
+def test_the_image_may_be_named_by_another_way_to_the_folder(tmp_path: Path) -> None:
+    """Absolutely, with `..`, or through a link, as long as the folder is the file's own."""
+    (tmp_path / "maps" / "below").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "maps")
+    (tmp_path / "maps" / "image.pgm").write_bytes(PGM)
+    (tmp_path / "maps" / "below" / "image.pgm").write_bytes(PGM)
+    path = tmp_path / "maps" / "m.yaml"
+    for name in (
+        f"{tmp_path}/maps/image.pgm", f"{tmp_path}/maps/below/image.pgm", "../maps/image.pgm",
+        "below/../image.pgm", f"{tmp_path}/link/image.pgm", f"{tmp_path}/maps/../maps/image.pgm",
+    ):  # fmt: skip
+        path.write_text(YAML.replace("image.pgm", name))
+        for file in (path, tmp_path / "link" / "m.yaml"):
+            assert grid_of(load_world(file)).cells.tolist() == [[True, False]]
+    (tmp_path / "mapsimage.pgm").write_bytes(PGM)
+    for name in (f"{tmp_path}/mapsimage.pgm", "../mapsimage.pgm", "below/../../mapsimage.pgm"):
+        path.write_text(YAML.replace("image.pgm", name))
+        assert "is outside the file's folder; if it is right, give" in refused(
+            partial(load_world, path)
+        )
+
+
 def test_the_image_may_be_named_by_the_user(tmp_path: Path) -> None:
     """The user may name an image in any folder."""
     (tmp_path / "maps").mkdir()

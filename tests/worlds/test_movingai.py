@@ -40,10 +40,41 @@ def test_header_may_stand_in_either_order_and_lines_end_in_any_way() -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "height 2\nwidth 3\nmap\n.@.\n...\n",
+        "width 3\nheight 2\nmap\n.@.\n...",
+        "height 2\nwidth 3\ntype octile\nmap\n.@.\n...\n",
+        "TYPE Octile\nHeight 2\nWIDTH 3\nMap\n.@.\n...\n",
+        "\n\nheight 2\n\nwidth 3 \n\nmap\t\n\n.@. \n...\t\n\n \n",
+        "\ufeffheight 2\r\nwidth 3\r\nmap\r\n.@.\r\n...",
+    ],
+)
+def test_headers_vary(text: str, tmp_path: Path) -> None:
+    """The type may be missing; order, capitals, blank lines and spaces at line ends are free."""
+    wanted = [[False, True, False], [False, False, False]]
+    assert parse_cells("grid", text.encode()).tolist() == wanted
+    for name in ("a.map", "a.unknown", "grid.map"):
+        (tmp_path / name).write_bytes(text.encode())
+        grid = load_world(tmp_path / name).grid
+        assert grid is not None
+        assert grid.cells.tolist() == wanted
+    for version in ("", "\n", "version 1\n", "Version 1.0 \n\n"):
+        line = "0\tgrid.map\t3\t2\t0\t0\t2\t0\t4.0"
+        (tmp_path / "a.scen").write_text(f"{version}{line}\r\n{line.replace('0', '1', 1)}")
+        world = make_world(f"{tmp_path}/a.scen#1")
+        assert ends(world) == [[0.5, 0.5], [2.5, 0.5]]
+        assert "0 of 2; choose" in load_world(tmp_path / "a.scen").notes[0]
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "grid:1: a grid map begins with the line 'type octile'"),
-        ("type tile\n", "grid:1: a grid map begins with the line 'type octile'"),
+        ("", "grid:1: there must be a line 'height H' and a line 'width W', and then the"),
+        ("type tile\n", "grid:1: the type of a grid map is 'octile'"),
+        ("map\n...\n...\n", "grid:1: there must be a line 'height H' and a line 'width W'"),
+        ("\n" * 99 + HEAD + "...\n...\n", "grid:20: there must be a line 'height H'"),
+        (HEAD + "\n\n...\n.X.\n", "grid:8: unknown character 'X'"),
         ("type octile\nheight 2\n", "grid:3: there must be a line 'height H' and a line 'width W'"),
         ("type octile\nheight 2\nheight 2\nmap\n", "grid:3: there must be a line 'height H'"),
         ("type octile\nheight 2 2\nwidth 3\nmap\n", "grid:2: there must be a line 'height H'"),
@@ -136,7 +167,7 @@ def test_where_the_map_is_looked_for(scen: Path, tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("version 1", "version 2", ":1: the first line must be 'version 1', not 'version 2'"),
-        ("version 1\n", "", ":1: the first line must be 'version 1'"),
+        ("version 1\n", "edition 1\n", ":1: the first line must be 'version 1', not 'edition 1'"),
         (LIST, "version 1\n\n", ": no scenario 0; there are 0, counted from 0"),
         ("\t1\n", "\n", ":2: 8 fields; there must be 9: bucket, map, width, height, start x y"),
         ("\t3\t2\t0\t0", "\t2\t3\t0\t0", ":2: width 2, but "),

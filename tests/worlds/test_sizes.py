@@ -68,14 +68,14 @@ def test_tiny_robots(robot: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["polygon", "chain"])
-def test_robots_in_files(kind: str) -> None:
+def test_robots_in_files(kind: str, tmp_path: Path) -> None:
     """Vertices and offsets as well."""
     tiny: Any = [[0, 0], [1e-170, 0], [0, 1e-170]]
     data = {"schema": "brrt.robot", "version": 1, "kind": kind, "polygons": [tiny]}
     if kind == "chain":
         del data["polygons"]
         data |= {"base": [0, 0], "joints": [{"offset": [1e200, 0], "link": [[0, 0], [1, 0]]}]}
-    path = Path("robot.json")
+    path = tmp_path / "robot.json"
     path.write_text(json.dumps(data))
     message = refused(lambda: make_robot(str(path)))
     assert "must be at least 1e-100" in message or "must be 2 finite numbers" in message

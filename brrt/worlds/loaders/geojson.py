@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from brrt.digits import tell_apart
 from brrt.errors import BrrtError
 from brrt.files import parse_json
 from brrt.settings import param
@@ -76,6 +77,7 @@ class GeoJson(Loader):
         if box is not None:
             values = _positions(f"{path}: bbox", [box], (4, 6))[0]
             lower, upper = values[:2], values[len(values) // 2 :][:2]
+            _check_box(path, lower.tolist(), upper.tolist())
         else:
             corners = [rings[0] for _, rings in found.polygons]
             corners += [end[None] for end in found.ends.values()]
@@ -169,6 +171,19 @@ class _Geometries:
             )
         if rings:
             self.polygons.append((place, rings))
+
+
+def _check_box(path: Path, lower: list[float], upper: list[float]) -> None:
+    """Check that a bbox is not crossed, as one across the antimeridian is (RFC 7946, 5.2)."""
+    west, east = tell_apart(lower[0], upper[0])
+    south, north = tell_apart(lower[1], upper[1])
+    if lower[0] > upper[0]:
+        raise BrrtError(
+            f"{path}: bbox: west {west} is greater than east {east}; coordinates are used as plane "
+            f"ones, so add 360 to those beyond the antimeridian, or swap the two"
+        )
+    if lower[1] > upper[1]:
+        raise BrrtError(f"{path}: bbox: south {south} is greater than north {north}; swap them")
 
 
 def _end(feature: dict[str, Any]) -> str | None:

@@ -1,10 +1,11 @@
 """Base class of the loaders of world files, and helpers to read text formats."""
 
 import math
+import os
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path, PureWindowsPath
 from typing import ClassVar
 
 from brrt.errors import BrrtError
@@ -110,19 +111,27 @@ def file_named_in(where: str, path: Path, name: str, remedy: str) -> Path:
     Args:
         where: File and position of the name, for messages.
         path: The file that contains the name.
-        name: The name.
+        name: The name; absolute, or relative to the file's folder.
         remedy: How the user can name such a file explicitly.
 
     Raises:
-        BrrtError: The name is absolute or contains `..`.
+        BrrtError: The name leads out of the folder.
     """
-    parts = (*PurePosixPath(name).parts, *PureWindowsPath(name).parts)
-    absolute = PurePosixPath(name).is_absolute() or PureWindowsPath(name).anchor
-    if absolute or PureWindowsPath(name).drive or ".." in parts:
-        raise BrrtError(
-            f"{where}: {name[:80]!r} is outside the file's folder; if it is right, give {remedy}"
-        )
-    return path.parent / name
+    folder = os.path.abspath(path.parent)  # noqa: PTH100 - pathlib does not remove `..`
+    named = os.path.normpath(os.path.join(folder, name))  # noqa: PTH118
+    followed = os.path.realpath(Path(named).parent), os.path.realpath(folder)
+    for inner, outer in ((named, folder), followed):
+        if Path(inner).is_relative_to(outer) and not _is_of_windows(name):
+            return path.parent / os.path.relpath(named, folder) if inner == named else Path(named)
+    raise BrrtError(
+        f"{where}: {name[:80]!r} is outside the file's folder; if it is right, give {remedy}"
+    )
+
+
+def _is_of_windows(name: str) -> bool:
+    """Whether a name leads out of a folder on Windows only."""
+    windows = PureWindowsPath(name)
+    return os.name != "nt" and "\\" in name and (bool(windows.anchor) or ".." in windows.parts)
 
 
 def file_named_by_user(path: Path, name: str) -> Path:

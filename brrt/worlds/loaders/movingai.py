@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -23,9 +24,14 @@ from brrt.worlds.world import World
 
 FREE, BLOCKED = ".GS", "@OTW"
 
-_HEADER = ("type", "height", "width", "map")
+_HEADER_LINES = 20
+"""Maximum lines of the header, blank ones included."""
+
 _LONGEST = 100_000
 """Maximum number of rows or columns."""
+
+_FIELDS = 9
+"""Fields of a scenario."""
 
 _CHARACTERS = (FREE + BLOCKED).encode()
 _MEANING = bytes((chr(code) in BLOCKED) + 2 * (code not in _CHARACTERS) for code in range(256))
@@ -43,8 +49,9 @@ class GridMap(Loader):
 
     @classmethod
     def recognises(cls, head: bytes) -> bool:
-        """Whether the first word is `type`."""
-        return head.split(None, 1)[:1] == [b"type"]
+        """Whether the first word is one of a map's header."""
+        first = head.removeprefix(b"\xef\xbb\xbf").split(None, 1)[:1]
+        return bool(first) and first[0].lower() in (b"type", b"height", b"width")
 
     def read(self, path: Path, _query: str, /) -> World:
         """Read a map."""
@@ -67,17 +74,17 @@ class GridScenarios(Loader):
     @classmethod
     def recognises(cls, head: bytes) -> bool:
         """Whether the first word is `version`."""
-        return head.split(None, 1)[:1] == [b"version"]
+        return head.split(None, 1)[:1] == [b"version"]  # may be missing where the suffix decides
 
     def read(self, path: Path, query: str, /) -> World:
         """Read a scenario and its map."""
         number, line, count = _find_scenario(path, query)
         where = f"{path}:{number}"
         words = [w.strip() for w in (line.split("\t") if "\t" in line else line.split())]
-        if len(words) != 9:
+        if len(words) != _FIELDS:
             raise BrrtError(
-                f"{where}: {len(words)} fields; there must be 9: bucket, map, width, height, "
-                f"start x y, goal x y, length"
+                f"{where}: {len(words)} fields; there must be {_FIELDS}: bucket, map, width, "
+                f"height, start x y, goal x y, length"
             )
         source = self._map_file(where, path, words[1])
         cells = _read_cells(source)
@@ -135,11 +142,15 @@ def _find_scenario(path: Path, query: str) -> tuple[int, str, int]:
 
 
 def _scenarios(path: Path) -> Iterator[tuple[int, str]]:
-    lines = lines_of(str(path), read_text(path, "a list of scenarios", MOST_BYTES))
-    _, version = next(lines)
-    if version.split() not in (["version", "1"], ["version", "1.0"]):
-        raise BrrtError(f"{path}:1: the first line must be 'version 1', not {version[:40]!r}")
-    return ((number, line) for number, line in lines if line.strip())
+    text = read_text(path, "a list of scenarios", MOST_BYTES)
+    lines = ((number, line) for number, line in lines_of(str(path), text) if line.strip())
+    number, first = next(lines, (1, ""))
+    words = first.lower().split()
+    if words[:1] != ["version"] and len(words) >= _FIELDS:
+        return chain([(number, first)], lines)
+    if words not in (["version", "1"], ["version", "1.0"]):
+        raise BrrtError(f"{path}:{number}: the first line must be 'version 1', not {first[:40]!r}")
+    return lines
 
 
 def _centre(where: str, what: str, words: list[str], cells: Bools) -> Floats:
@@ -154,6 +165,9 @@ def _centre(where: str, what: str, words: list[str], cells: Bools) -> Floats:
 def parse_cells(name: str, data: bytes) -> Bools:
     """Read a header (`type octile`, `height H`, `width W`, `map`) and H rows of W characters.
 
+    The type may be missing, the lines before `map` may be in any order and in capitals, and there
+    may be blank lines around the rows and spaces at the end of a line.
+
     Args:
         name: Name of the file, for messages.
         data: Contents of the file.
@@ -166,9 +180,12 @@ def parse_cells(name: str, data: bytes) -> Bools:
     """
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    *head, rest = [*data.split(b"\n", len(_HEADER)), b""][: len(_HEADER) + 1]
-    height, width = _parse_header(name, head)
+    height, width, number, begin = _parse_header(name, data)
+    rest = data[begin:].lstrip(b"\n")
+    first = number + 1 + len(data) - begin - len(rest)
     rest = rest.rstrip()
+    if b" " in rest or b"\t" in rest:
+        rest = b"\n".join(row.rstrip(b" \t") for row in rest.split(b"\n"))
     rows = rest.count(b"\n") + bool(rest)
     if rows != height:
         raise BrrtError(f"{name}: {rows:,} rows below 'map'; the header states height {height}")
@@ -177,14 +194,14 @@ def parse_cells(name: str, data: bytes) -> Bools:
         meaning = codes.reshape(height, width + 1)[:, :width]
         if meaning.max() <= 1:
             return np.ascontiguousarray(meaning == 1)
-    raise _wrong_row(name, width, rest)
+    raise _wrong_row(name, width, rest, first)
 
 
-def _wrong_row(name: str, width: int, rows: bytes) -> BrrtError:
-    """Return the error for the first wrong row."""
+def _wrong_row(name: str, width: int, rows: bytes, first: int) -> BrrtError:
+    """Return the error for the first wrong row; `first` is the number of the first row's line."""
     number, row = next(
         (number, row)
-        for number, row in enumerate(rows.split(b"\n"), len(_HEADER) + 1)
+        for number, row in enumerate(rows.split(b"\n"), first)
         if len(row) != width or row.strip(_CHARACTERS)
     )
     text = row.decode("utf-8", "replace")
@@ -198,19 +215,24 @@ def _wrong_row(name: str, width: int, rows: bytes) -> BrrtError:
     )
 
 
-def _parse_header(name: str, head: list[bytes]) -> tuple[int, int]:
-    """Return height and width, which may be in either order."""
-    sizes = {"height": 0, "width": 0}
-    lines = [line[:200].decode("utf-8-sig", "replace") for line in head]
-    for number, wanted in enumerate(_HEADER, 1):
-        words = lines[number - 1].split() if number <= len(lines) else []
+def _parse_header(name: str, data: bytes) -> tuple[int, int, int, int]:
+    """Return height, width, the number of the line `map`, and where the next one begins."""
+    sizes: dict[str, int] = {}
+    number, begin = 0, 0
+    for number, line in enumerate(data.split(b"\n", _HEADER_LINES)[:_HEADER_LINES], 1):
+        begin += len(line) + 1
+        words = line[:200].decode("utf-8-sig", "replace").lower().split()
         where = f"{name}:{number}"
-        if wanted == "type" and words != ["type", "octile"]:
-            raise BrrtError(f"{where}: a grid map begins with the line 'type octile'")
-        if wanted == "map" and words != ["map"]:
-            raise BrrtError(f"{where}: this must be the line 'map', below height and width")
-        if wanted in sizes:
-            if len(words) != 2 or words[0] not in sizes or sizes[words[0]]:
-                raise BrrtError(f"{where}: there must be a line 'height H' and a line 'width W'")
+        if words == ["map"] and len(sizes) == 2:
+            return sizes["height"], sizes["width"], number, begin
+        if words[:1] == ["type"]:
+            if words != ["type", "octile"]:
+                raise BrrtError(f"{where}: the type of a grid map is 'octile'")
+        elif len(words) == 2 and words[0] in ("height", "width") and words[0] not in sizes:
             sizes[words[0]] = whole(where, words[0], words[1], 1, _LONGEST)
-    return sizes["height"], sizes["width"]
+        elif words:
+            break
+    missing = "this must be the line 'map', below height and width"
+    if len(sizes) < 2:
+        missing = "there must be a line 'height H' and a line 'width W', and then the line 'map'"
+    raise BrrtError(f"{name}:{number}: {missing}")
