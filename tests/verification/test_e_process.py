@@ -8,16 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brrt.verification.e_process import (
-    BernoulliTest,
-    EProcess,
+from brrt.verification.draw_tests import (
+    EvennessTest,
+    FrequencyTest,
     JointUniformityTest,
-    Monitor,
-    Partitions,
+    RelationTest,
     UniformityTest,
-    log_gamma,
-    log_mean,
 )
+from brrt.verification.e_process import EProcess, Monitor, Partitions, log_gamma, log_mean
 
 BIAS = 0.05
 
@@ -31,9 +29,13 @@ def ended(rng: np.random.Generator) -> Iterator[tuple[EProcess, np.ndarray]]:
     u = u[: ends[0] + 1] if len(ends) else u
     yield UniformityTest("x"), u[:, 0]
     yield JointUniformityTest(2), u
-    tosses = (u[:, 0] < BIAS).astype(float)
-    stop = np.flatnonzero(tosses)
-    yield BernoulliTest(BIAS, "the goal"), tosses[: stop[0] + 1] if len(stop) else tosses
+    yield EvennessTest("x"), u[:, 0]
+    yield EvennessTest("x, y", 2), u
+    yield RelationTest(("x", "y")), u
+    chance = rng.choice([0.02, BIAS, 0.3], n)
+    tosses = np.stack([rng.random(n) < chance, chance], axis=1)
+    stop = np.flatnonzero(tosses[:, 0])
+    yield FrequencyTest("the goal"), tosses[: stop[0] + 1] if len(stop) else tosses
 
 
 @pytest.mark.parametrize("alarm", [0.05, 0.3])
@@ -42,7 +44,7 @@ def test_false_alarms_are_no_more_than_stated(alarm: float) -> None:
 
     If the probability is at its limit, the count exceeds that below once in a million.
     """
-    rng, runs, alarms = np.random.default_rng(5), 250, np.zeros(3)
+    rng, runs, alarms = np.random.default_rng(5), 250, np.zeros(6)
     for _ in range(runs):
         for i, (test, draws) in enumerate(ended(rng)):
             monitor = Monitor(test, 1, alarm)

@@ -6,7 +6,6 @@ has drawn before, its next draw is uniform; so it does not matter at which draw 
 that failed draws are repeated.
 """
 
-from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -17,17 +16,20 @@ from brrt.replay.text import vector
 from brrt.robots import Point
 from brrt.scenario.contract import Contract, Draws
 from brrt.verification.context import Context
-from brrt.verification.draws import Drawn
-from brrt.verification.e_process import (
-    BernoulliTest,
-    EProcess,
+from brrt.verification.draw_tests import (
+    EvennessTest,
+    FrequencyTest,
     JointUniformityTest,
-    Monitor,
+    RelationTest,
     UniformityTest,
 )
+from brrt.verification.draws import Drawn
+from brrt.verification.e_process import EProcess, Monitor
 from brrt.verification.rule import ANY_PART, Rule
+from brrt.verification.timeline import row_keys
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 _THIN = 1e-8
@@ -37,10 +39,24 @@ _FINE = 1e-9
 """Ranges that are a smaller part of their coordinates are rounded too coarsely to be judged."""
 
 
+_SHIFTS, _SPARE_BITS = (8, 20), 26
+"""Leading bits of a draw after which it is tested again, and bits that must follow these."""
+
+_REMEMBERED = 1_000_000
+"""Draws with which others are compared."""
+
+_KEYS = np.dtype([("key", "<u8"), ("first", "<f8"), ("seq", "<i8")])
+
+
+def _coarseness(context: Context) -> Floats:
+    """Return by how much coordinates exceed the range between their bounds, shape (dof,)."""
+    most = np.abs([context.lower, context.upper]).max(axis=0)
+    return np.asarray(most / (context.upper - context.lower))
+
+
 def _is_fine(context: Context) -> Flags:
     """Return which axes have enough numbers between their bounds, shape (dof,)."""
-    wide = context.upper - context.lower
-    return np.asarray(wide > _FINE * np.abs([context.lower, context.upper]).max(axis=0))
+    return np.asarray(_coarseness(context) < 1 / _FINE)
 
 
 class Samples(Rule):
@@ -128,52 +144,50 @@ class LongRunRule(Rule):
     """A rule about frequencies or uniformity, which accumulates evidence against the promise.
 
     Attributes:
-        tests: The tests of a recording that share the rate of false alarms: for each stretch on
-            two frequencies, for each axis on uniform and on informed draws, on all axes together,
-            and on the smoother's pairs.
+        tests: The tests of a recording that share the rate of false alarms: of two frequencies and
+            of the smoother's pairs; of uniform draws three for all axes together and four for each
+            axis; of informed draws one for each axis.
+        monitors: The tests of the rule.
     """
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self.tests = 2 * len(context.stretches) + 2 + 2 * context.dof
-        self.monitors: list[Monitor | None] = []
+        self.tests = 6 + 5 * context.dof
+        self.monitors: list[Monitor] = []
 
     def monitor(self, test: EProcess) -> Monitor:
         """Follow a test."""
-        return Monitor(test, self.tests)
+        self.monitors.append(Monitor(test, self.tests))
+        return self.monitors[-1]
 
     def take(self, monitor: Monitor, table: Table, draws: Floats) -> None:
         """Pass draws to a test, one for each row of the table."""
-        self.result.examined += len(table)
         for row, message in monitor.follow(draws):
             self.result.add_finding(table[row], message)
 
     def finish(self) -> None:
         for monitor in self.monitors:
-            for message in () if monitor is None else monitor.close():
+            for message in monitor.close():
                 self.result.add_finding(None, message)
 
 
 class FrequencyRule(LongRunRule):
-    """A rule about how often a source is used, tested apart in each stretch."""
+    """A rule about how often a source is used, whatever its chance in each stretch."""
 
     needs = "draws"
     kind = Kind.SAMPLE
     what: ClassVar[str]
 
-    def __init__(self, context: Context, chance: Callable[[Draws], float]) -> None:
+    def __init__(self, context: Context) -> None:
         super().__init__(context)
-        draws = [contract.draws for _, contract in context.stretches]
-        chances = [0.0 if each is None else chance(each) for each in draws]
-        self.monitors = [
-            self.monitor(BernoulliTest(p, self.what)) if 0 < p < 1 else None for p in chances
-        ]
+        self.test = self.monitor(FrequencyTest(self.what))
 
-    def judge_source(self, table: Table, source: Source) -> None:
-        """Test how many of the rows are from a source."""
-        monitor = self.monitors[int(self.context.stretch(table[:1])[0])] if len(table) else None
-        if monitor is not None:
-            self.take(monitor, table, np.asarray(table["source"] == source, np.float64))
+    def judge_source(self, table: Table, source: Source, chance: float) -> None:
+        """Test how many of the rows are from a source, each with a chance."""
+        if 0 < chance < 1:
+            self.result.examined += len(table)
+            occurs = np.asarray(table["source"] == source, np.float64)
+            self.take(self.test, table, np.stack([occurs, np.full(len(table), chance)], axis=1))
 
 
 class GoalDraws(FrequencyRule):
@@ -181,16 +195,13 @@ class GoalDraws(FrequencyRule):
     promise = "The goal is drawn as often as stated (one false alarm in a million recordings)."
     what = "the goal"
 
-    def __init__(self, context: Context) -> None:
-        super().__init__(context, lambda draws: draws.goal_bias)
-
     def window(self, events: Events, contract: Contract) -> None:
         if contract.draws is not None:
             drawn = self.context.drawn
             chosen = np.isinf(drawn.best)
             if contract.draws.goal_in_reach:
                 chosen &= ~(drawn.forced | drawn.unsure)
-            self.judge_source(drawn.table[chosen], Source.GOAL)
+            self.judge_source(drawn.table[chosen], Source.GOAL, contract.draws.goal_bias)
 
 
 class CoinTosses(FrequencyRule):
@@ -198,40 +209,98 @@ class CoinTosses(FrequencyRule):
     promise = "A tree aims at the other as often as stated (one false alarm in a million)."
     what = "the other tree's newest node"
 
-    def __init__(self, context: Context) -> None:
-        super().__init__(context, lambda draws: draws.coin)
-
     def window(self, events: Events, contract: Contract) -> None:
-        self.judge_source(events[Kind.SAMPLE], Source.OTHER_TREE)
+        if contract.draws is not None:
+            self.judge_source(events[Kind.SAMPLE], Source.OTHER_TREE, contract.draws.coin)
 
 
 class UniformDraws(LongRunRule):
     name = "uniform draws"
-    promise = "Uniform samples are uniform within the bounds (one false alarm in a million)."
+    promise = (
+        "Uniform samples are uniform within the bounds and independent of each other (one false "
+        "alarm in a million recordings)."
+    )
     needs = "draws"
     kind = Kind.SAMPLE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         names, fine = context.robot.coordinates(context.world), np.flatnonzero(_is_fine(context))
-        tests: list[EProcess] = [
-            UniformityTest(names[k], context.lower[k], context.upper[k]) for k in fine.tolist()
-        ]
-        self.axes: list[int | NDArray[np.int64]] = [*fine.tolist()]
+        bits = 52 - np.log2(_coarseness(context))
+        self.each: list[tuple[Monitor, int | Ints, float]] = []
+        """Each test, the axes that it takes, and the part of their ranges that it looks at."""
+        for k in fine.tolist():
+            self._follow(UniformityTest(names[k], context.lower[k], context.upper[k]), k)
+            self._follow(EvennessTest(names[k]), k)
+            for shift in (shift for shift in _SHIFTS if shift + _SPARE_BITS <= bits[k]):
+                where = f"{names[k]} within 1/{2**shift:,} of its range"
+                self._follow(UniformityTest(where), k, 2.0**shift)
         if len(fine) > 1:
-            self.axes.append(fine)
-            tests.append(JointUniformityTest(len(fine)))
-        self.monitors = list(map(self.monitor, tests))
+            self._follow(JointUniformityTest(len(fine)), fine)
+            self._follow(EvennessTest(", ".join(names[k] for k in fine[:8]), len(fine)), fine)
+            self._follow(RelationTest(tuple(names[k] for k in fine)), fine)
+
+    def _follow(self, test: EProcess, axes: int | Ints, parts: float = 1.0) -> None:
+        self.each.append((self.monitor(test), axes, parts))
 
     def window(self, events: Events, contract: Contract) -> None:
         if contract.draws is None:
             return
         samples, lower = events[Kind.SAMPLE], self.context.lower
         table = samples[samples["source"] == Source.UNIFORM]
+        self.result.examined += len(table)
         part = (table["q"] - lower) / (self.context.upper - lower)
-        for axes, monitor in zip(self.axes, self.monitors, strict=True):
-            if monitor is not None:
-                self.take(monitor, table, part[:, axes])
+        for monitor, axes, parts in self.each:
+            draws = part[:, axes]
+            self.take(monitor, table, draws if parts == 1 else draws * parts % 1)
+
+
+class RepeatedDraws(Rule):
+    """Judges the first million draws of a generator against each other, later ones against them."""
+
+    name = "repeated draws"
+    promise = "No uniform or informed sample is drawn twice."
+    needs = "draws"
+    kind = Kind.SAMPLE
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        fine = context.dof > 1 and bool(_is_fine(context).all())
+        branches = context.manifest.branches
+        reseeded = [branch.events for branch in branches if branch.seed is not None]
+        self.firsts, self.judges, self.stream = np.array(reseeded, np.int64), fine, 0
+        self.seen = np.empty(0, _KEYS)
+
+    def window(self, events: Events, contract: Contract) -> None:
+        if contract.draws is None or not self.judges:
+            return
+        table = events[Kind.SAMPLE]
+        table = table[np.isin(table["source"], (Source.UNIFORM, Source.INFORMED))]
+        # Windows end where branches begin; a branch that draws from its own seed may draw again
+        # what its parent has drawn.
+        stream = int(np.searchsorted(self.firsts, table["seq"][:1], "right").sum())
+        if stream != self.stream:
+            self.stream, self.seen = stream, self.seen[:0]
+        keys = np.empty(len(table), _KEYS)
+        keys["key"] = row_keys((), np.asarray(table["q"]))
+        keys["first"], keys["seq"] = table["q"][:, 0], table["seq"]
+        known = np.concatenate([self.seen, keys])
+        known = known[np.argsort(known["key"], kind="stable")]
+        again = np.ones(max(len(known) - 1, 0), bool)
+        for name in ("key", "first"):
+            again &= known[name][1:] == known[name][:-1]
+        before, later = known["seq"][:-1][again].tolist(), known["seq"][1:][again].tolist()
+        earlier = dict(zip(later, before, strict=True))
+        twice = np.isin(table["seq"], later)
+        self.judge(
+            table, twice,
+            lambda i: (
+                f"sample {vector(table['q'][i])} was drawn before, by event "
+                f"{earlier[int(table['seq'][i])]}"
+            ),
+        )  # fmt: skip
+        if len(self.seen) < _REMEMBERED:
+            self.seen = known
 
 
 class UniformInformedDraws(LongRunRule):
@@ -244,17 +313,17 @@ class UniformInformedDraws(LongRunRule):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        names = context.robot.coordinates(context.world)
-        self.monitors = [self.monitor(UniformityTest(f"{name} along its chord")) for name in names]
+        for name in context.robot.coordinates(context.world):
+            self.monitor(UniformityTest(f"{name} along its chord"))
 
     def window(self, events: Events, contract: Contract) -> None:
         if contract.draws is None or not isinstance(self.context.robot, Point):
             return
         table, best = _informed(self.context.drawn)
+        self.result.examined += len(table)
         for k, monitor in enumerate(self.monitors):
             part, valid = _along_chord(self.context, np.asarray(table["q"]), best, k)
-            if monitor is not None:
-                self.take(monitor, table[valid], part[valid])
+            self.take(monitor, table[valid], part[valid])
 
 
 def _along_chord(context: Context, q: Floats, best: Floats, k: int) -> tuple[Floats, Flags]:
@@ -294,8 +363,8 @@ class RandomPairs(LongRunRule):
             if end > begin:
                 some = table[begin:end]
                 valid, part = _ranks(len(path), some, rng)
+                self.result.examined += int(valid.sum())
                 self.take(monitor, some[valid], part[valid])
-        self.monitors = [monitor]
         super().finish()
 
 
@@ -313,6 +382,6 @@ def _ranks(points: int, table: Table, rng: np.random.Generator) -> tuple[Flags, 
 
 
 RULES = (
-    Samples, Sources, InformedSamples, GoalDraws, CoinTosses, UniformDraws, UniformInformedDraws,
-    RandomPairs,
+    Samples, Sources, InformedSamples, GoalDraws, CoinTosses, UniformDraws, RepeatedDraws,
+    UniformInformedDraws, RandomPairs,
 )  # fmt: skip
