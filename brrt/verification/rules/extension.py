@@ -286,7 +286,7 @@ class Meetings(IterationRule):
             rows = np.concatenate([self.newest, rows])
             newest = [_newest(rows, tree) for tree in (0, 1)]
             self._judge_attempts(rows, newest, contract.link)
-            self._judge_links(rows, newest)
+            self._judge_links(rows, newest, contract.link)
             self.newest = np.stack([rows[of_rows[-1]] for of_rows in newest])
 
     def _judge_attempts(self, rows: Table, newest: list[Ints], link: float) -> None:
@@ -304,8 +304,8 @@ class Meetings(IterationRule):
             lambda i: f"the newest nodes are {far[i]:.9g} apart, and no link is attempted",
         )  # fmt: skip
 
-    def _judge_links(self, rows: Table, newest: list[Ints]) -> None:
-        """Judge whether links, and attempts, are between the newest nodes."""
+    def _judge_links(self, rows: Table, newest: list[Ints], link: float) -> None:
+        """Judge whether links, and attempts, are between the newest nodes, which are close."""
         at = np.flatnonzero(_link_blocked(rows))
         tries, start, goal = rows[at], rows[newest[0][at]], rows[newest[1][at]]
         wrong = (tries["tree"] != 0) | (tries["node"] != start["node"])
@@ -313,6 +313,11 @@ class Meetings(IterationRule):
         self.judge(
             tries, np.asarray(wrong),
             lambda i: f"a link from node {tries['node'][i]} to {vector(tries['q'][i])}, not newest",
+        )  # fmt: skip
+        far = self.context.distance(start["q"], tries["q"])
+        self.judge(
+            tries, ~wrong & ~self.context.at_most(far, link),
+            lambda i: f"an attempt to link nodes {far[i]:.9g} apart; the limit is {link:.9g}",
         )  # fmt: skip
         at = np.flatnonzero(rows["kind"] == Kind.CONNECT)
         links = rows[at]

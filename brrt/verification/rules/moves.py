@@ -16,6 +16,10 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
+_ROUNDED = 1e-12
+"""Part by which a motion may exceed a whole number of moves."""
+
+
 class MoveRule(Rule):
     """A rule that judges all moves."""
 
@@ -175,6 +179,33 @@ class MovesAlongPath(MoveRule):
             self.judge_one(event, wrong)
 
 
+class MoveCounts(MoveRule):
+    name = "move counts"
+    promise = "A robot that executes a path makes the fewest moves that the limit allows."
+
+    def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
+        context, chosen = self.context, _along_path(self.context, table)
+        table = table[chosen]
+        if not len(table) or not context.paths or len(context.paths[-1][1]) < 2:
+            return
+        path = context.paths[-1][1]
+        far = np.asarray(context.distance(path[:-1], path[1:]))
+        limit = context.manifest.scenario.max_move
+        moves = np.maximum(np.ceil(far / limit * (1 - _ROUNDED)), 1)
+        made, row = np.cumsum(moves), np.arange(len(table))
+        motion = np.searchsorted(made, row, side="right")
+        missing = motion == len(far)
+        motion[missing] = 0
+        part = (row - made[motion] + moves[motion] + 1) / moves[motion]
+        here = np.append(0.0, np.cumsum(far))[motion] + part * far[motion]
+        here[missing] = np.nan
+        length = np.cumsum(context.distance(before[chosen], table["q"]))
+        self.judge(
+            table, ~context.equal(length, here),
+            lambda i: f"move {i + 1} ends {length[i]:.12g} along the path, not {here[i]:.12g}",
+        )  # fmt: skip
+
+
 class _Polyline:
     """A path on which positions are looked up.
 
@@ -203,4 +234,4 @@ class _Polyline:
         return None
 
 
-RULES = (Moves, MoveCosts, MoveLengths, MovesFree, Arrival, PathsWalked, MovesAlongPath)
+RULES = (Moves, MoveCosts, MoveLengths, MovesFree, Arrival, PathsWalked, MovesAlongPath, MoveCounts)

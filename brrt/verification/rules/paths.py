@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.motions import all_clear
 from brrt.events import Kind, Phase, Stage, Status, Table
 from brrt.replay.text import vectors
 from brrt.verification.context import Context
@@ -17,6 +18,9 @@ Floats = NDArray[np.float64]
 Place = tuple[float, ...]
 
 _NEVER = 1 << 62
+
+MOST = 20_000
+"""Refused shortcuts that are judged, spread over the log."""
 
 
 class PathEnds(Rule):
@@ -164,17 +168,31 @@ def _links(context: Context) -> dict[tuple[Place, Place], int]:
 
 class Shortcuts(Rule):
     name = "shortcuts"
-    promise = "Shortcuts replace what is between two waypoints by a free motion, at no more cost."
+    promise = (
+        "Shortcuts replace what is between two waypoints by a free motion, at no more cost; the "
+        "motions of refused ones are not free."
+    )
 
     def finish(self) -> None:
-        path, cost, due = np.empty((0, self.context.dof)), np.inf, self.context.planned_paths
-        for event in self.context.events[Kind.SHORTCUT]:
+        context = self.context
+        path, cost, due = np.empty((0, context.dof)), np.inf, context.planned_paths
+        table = context.events[Kind.SHORTCUT]
+        ends, every = np.full((2, len(table), context.dof), np.nan), -(-len(table) // MOST)
+        for row, event in enumerate(table):
             while due and due[0][0]["seq"] < event["seq"]:
                 first, path = due.pop(0)
                 cost = float(first["cost"])
-            wrong, path = self._attempt(event, path, cost)
+            wrong, shorter = self._attempt(event, path, cost)
             self.judge_one(event, wrong)
-            cost = float(event["cost"])
+            if wrong is None and not event["accepted"] and row % every == 0:
+                ends[:, row] = path[event["i"]], path[event["j"]]
+            path, cost = shorter, float(event["cost"])
+        rows = np.flatnonzero(np.isfinite(ends[0, :, 0]))
+        a, b = ends[:, rows]
+        for row in rows[all_clear(context.obstacles, context.robot, a, b)].tolist():
+            i, j = table["i"][row], table["j"][row]
+            message = f"refused, but the motion from waypoint {i} to {j} is clear"
+            self.result.add_finding(table[row], message)
 
     def _attempt(self, event: Any, path: Floats, cost: float) -> tuple[str | None, Floats]:
         """Make an attempt; return what is wrong with it, and the path after it."""

@@ -32,7 +32,8 @@ DOCTORED: list[Doctored] = [
      "lattice moves", "choices", "paths walked"}),
     ("move costs", "", on("march", shifted(Kind.MOVE, "cost", -1, 1e-6)), set()),
     ("move lengths", "", on("march", lambda c: c.edit(Kind.MOVE, -1,
-     q=c.log[Kind.MOVE]["q"][-2] + 5.0)), {"move costs", "arrival", "moves along path"}),
+     q=c.log[Kind.MOVE]["q"][-2] + 5.0)), {"move costs", "arrival", "moves along path",
+     "move counts"}),
     ("moves free", "", on("march", lambda c: c.with_ball(c.log[Kind.MOVE]["q"][50])),
      {"paths free"}),
     ("arrival", "", on("march", lambda c: c.drop(Kind.MOVE, -1)), set()),
@@ -45,7 +46,8 @@ DOCTORED: list[Doctored] = [
     ("paths walked", "continues after its path", lambda: change("lrta-star", Kind.MOVE, {"trial":
      1}, trial=0), {*SEARCH, "moves", "move costs", "move lengths", "moves free"}),
     ("moves along path", "", on("march", lambda c: c.edit(Kind.PATH, 0,
-     waypoints=c.log[Kind.PATH]["waypoints"][0][[0, 2]])), {"path costs"}),
+     waypoints=c.log[Kind.PATH]["waypoints"][0][[0, 2]])), {"path costs", "move counts"}),
+    ("move counts", "", on("march", lambda c: c.with_scenario(max_move=7.0)), set()),
 ]  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Recordings that break rules about paths."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,6 +51,11 @@ def without_raw(case: Case) -> Case:
     return case.drop(Kind.PATH, first(case.log[Kind.PATH], stage=Stage.RAW))
 
 
+def refusing(case: Case) -> Case:
+    """Take away the obstacles that refused shortcuts hit."""
+    return replace(case, world=replace(case.world, balls=case.world.balls[:0]))
+
+
 def shortcut_row(case: Case, accepted: bool) -> int:
     """The first shortcut that was, or was not, accepted."""
     return first(case.log[Kind.SHORTCUT], accepted=accepted)
@@ -73,6 +79,7 @@ DOCTORED: list[Doctored] = [
      i=-4)), set()),
     ("shortcuts", "", on("rrt", lambda c: shifted(Kind.SHORTCUT, "cost", shortcut_row(c,
      accepted=False), 5.0)(c)), set()),
+    ("shortcuts", "is clear", on("rrt", refusing), {"rejections", "reasons", "smoothed"}),
     ("smoothed", "", on("rrt", lambda c: c.edit(Kind.SHORTCUT, shortcut_row(c, accepted=True),
      accepted=False)), {"shortcuts"}),
     ("smoothed", "has reported 0 paths", lambda: altered(dropped, "rrt", Kind.PATH, -1),
