@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from brrt import Recording, Run, Scenario, verify
 from brrt.verification import e_process
-from brrt.verification.rules import sampling
+from brrt.verification.rules import long_run
 from tests.support.scenarios import LINKS, PLANNERS, ROBOTS, command, draw
 
 LINE = "{:14} {:10} {:>7} {:>7} {:>10} {:>9}"
@@ -66,7 +66,7 @@ def accused(recording: Recording) -> bool:
     """Whether rules about draws are broken at a rate of false alarms of one in 20."""
     rate, e_process.FALSE_ALARM = e_process.FALSE_ALARM, LOOSE
     try:
-        return not verify(recording, rules=sampling.RULES).holds
+        return not verify(recording, rules=long_run.RULES).holds
     finally:
         e_process.FALSE_ALARM = rate
 

@@ -6,12 +6,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Stage, Table
+from brrt.events import Events, Kind, Source, Stage, Table
 from brrt.replay.tree_fold import Distance
 from brrt.verification.tolerances import CLOSE
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+
+_FINE = 1e-9
+"""Ranges that are a smaller part of their coordinates are rounded too coarsely to be judged."""
 
 
 class Drawn(NamedTuple):
@@ -29,6 +33,12 @@ class Drawn(NamedTuple):
     best: Floats
     forced: Flags
     unsure: Flags
+
+
+def informed_samples(drawn: Drawn) -> tuple[Table, Floats]:
+    """Return the informed samples, and what the best path cost then."""
+    chosen = (drawn.table["source"] == Source.INFORMED) & np.isfinite(drawn.best)
+    return drawn.table[chosen], drawn.best[chosen]
 
 
 @dataclass(slots=True)
@@ -70,3 +80,13 @@ class DrawHistory:
         self.near = bool(forced[-1]), bool(unsure[-1])
         self.sample = int(table["seq"][-1]) if len(table) else self.sample
         return Drawn(table, best, fresh & forced[newest], fresh & unsure[newest])
+
+
+def coarseness(lower: Floats, upper: Floats) -> Floats:
+    """Return by how much coordinates exceed the range between their bounds, shape (dof,)."""
+    return np.asarray(np.abs([lower, upper]).max(axis=0) / (upper - lower))
+
+
+def is_fine(lower: Floats, upper: Floats) -> Flags:
+    """Return which axes have enough numbers between their bounds, shape (dof,)."""
+    return np.asarray(coarseness(lower, upper) < 1 / _FINE)

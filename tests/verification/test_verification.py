@@ -103,8 +103,8 @@ def test_windows_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_every_rule_has_a_recording_that_breaks_it() -> None:
     """And a promise that is a sentence."""
-    modules = {rule.__module__.rpartition(".")[2] for rule in RULES}
-    tests = [import_module(f"tests.verification.rules.test_{name}") for name in sorted(modules)]
+    modules = {rule.__module__.rpartition(".")[::2] for rule in RULES}
+    tests = [import_module(f"tests.{package[5:]}.test_{name}") for package, name in sorted(modules)]
     assert {rule.name for rule in RULES} == {rule for test in tests for rule, *_ in test.DOCTORED}
     assert all(rule.promise.endswith(".") for rule in RULES)
 

@@ -1,24 +1,13 @@
 """All rules, one file for each subject. To add one, see `brrt.verification.rule`."""
 
 from brrt.verification.rule import Rule
-from brrt.verification.rules import (
-    extension,
-    lattice,
-    log,
-    lrta_star,
-    moves,
-    paths,
-    phases,
-    rejects,
-    rewiring,
-    sampling,
-    search,
-    sequence,
-    trees,
-)
+from brrt.verification.rules import log, long_run, moves, paths, phases, rejects, sampling, sequence
+from brrt.verification.rules.growth import extension, rewiring, trees
+from brrt.verification.rules.lattice import cells, lrta_star, search
 
-RULES: tuple[type[Rule], ...] = (
-    *log.RULES, *phases.RULES, *sequence.RULES, *sampling.RULES, *trees.RULES, *extension.RULES,
-    *rewiring.RULES, *rejects.RULES, *paths.RULES, *moves.RULES, *lattice.RULES, *lrta_star.RULES,
-    *search.RULES,
+_MODULES = (
+    log, phases, sequence, sampling, long_run, trees, extension, rewiring, rejects, paths, moves,
+    cells, lrta_star, search,
 )  # fmt: skip
+
+RULES: tuple[type[Rule], ...] = tuple(rule for module in _MODULES for rule in module.RULES)

@@ -49,7 +49,7 @@ DOCTORED: list[Doctored] = [
     ("bounds", "expand at", lambda: moved("a-star", Kind.EXPAND, -1, 500.0), SEARCH),
     ("bounds", "heuristic at", lambda: moved("lrta-star", Kind.HEURISTIC, 0, 500.0), SEARCH),
     ("bounds", "move at", lambda: moved("executed", Kind.MOVE, 1, 500.0), {"move costs",
-     "move lengths", "moves along path", "moves free"}),
+     "move lengths", "moves along path", "moves free", "move counts"}),
     ("bounds", "waypoint 1 at", lambda: change("rrt", Kind.PATH, 0,
      waypoints=np.insert(short("rrt").log[Kind.PATH]["waypoints"][0], 1, [-9.0, 4.0], axis=0)),
      {"path costs", "paths in trees", "shortcuts", "smoothed", "random pairs", "paths free"}),

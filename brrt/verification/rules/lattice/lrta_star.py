@@ -8,7 +8,7 @@ from brrt.events import Events, Kind
 from brrt.scenario.contract import Contract, Lattice
 from brrt.verification.context import Context
 from brrt.verification.rule import Rule
-from brrt.verification.rules.lattice import Cell, indices
+from brrt.verification.rules.lattice.cells import Cell, indices
 
 _NO_SEARCH = "a move without a search"
 

@@ -11,7 +11,7 @@ from brrt.replay.text import vector
 from brrt.scenario.contract import Lattice
 from brrt.verification.context import Context
 from brrt.verification.rule import LatticeRule
-from brrt.verification.rules.lattice import adjacent, indices
+from brrt.verification.rules.lattice.cells import adjacent, indices
 from brrt.verification.tolerances import CLOSE
 
 Floats = NDArray[np.float64]

@@ -88,7 +88,7 @@ DOCTORED: list[Doctored] = [
     ("edges free", "hits ball", on_body("chain", body_hit), FREE),
     ("edges free", "hits", on_body("polygon", posed(None, 1.0)), LENGTHS),
     ("edges free", "hits the bounds", on_body("polygon", lambda c: posed(1.0, 50.0,
-     0.0)(emptied(c))), LENGTHS | {"rejections"}),
+     0.0)(emptied(c))), LENGTHS | {"rejections", "shortcuts"}),
     ("edges free", "hits the robot itself", on_body("chain", posed(0.0, 2.9, 2.9)), LENGTHS),
     ("rewires", "", on("star", lambda c: c.add(Kind.REWIRE, node=leaf(c), parent=leaf(c))), set()),
     ("rewires", "", on("star", lambda c: c.add(Kind.REWIRE, node=leaf(c), parent=10**6)), set()),

@@ -1,0 +1,1 @@
+"""Rules about trees: nodes, how they grow, and how they rewire."""
