@@ -16,8 +16,11 @@ from brrt.kernels.jit import inline_helper
 
 Floats = NDArray[np.float64]
 
-COUNT, FIRST_SEQ, LAST_T, ORIGIN, TICK, POINTS = range(6)
+COUNT, FIRST_SEQ, LAST_T, ORIGIN, TICK, POINTS, UNTIL_T, UNTIL_SEQ, ASKED = range(9)
 """Places in `Buffer.state`."""
+
+_ASKED_PER_READING = 16
+"""Calls of `paused` for each reading of the clock, on a logical clock."""
 
 INTEGERS, REALS, CONFIGURATIONS = "integers", "reals", "q"
 """The columns of `Buffer` that hold fields."""
@@ -77,8 +80,8 @@ class Buffer(NamedTuple):
 
     Attributes:
         state: Number of events, seq of the first, time of the last, the clock's origin, ns between
-            two events of a logical clock (0: a real clock), and rows of `points` in use; shape
-            (6,), int64.
+            two events of a logical clock (0: a real clock), rows of `points` in use, the time and
+            the seq at which a kernel is to return, and calls of `paused`; shape (9,), int64.
         kind: Shape (n,), uint8.
         t: Time in ns since the origin, shape (n,), int64.
         iteration: Shape (n,), int64.
@@ -103,7 +106,7 @@ def empty_buffer(dof: int, capacity: int) -> Buffer:
     ends = [(place.column, place.end) for places in LAYOUT.values() for place in places]
     width = {name: max(end for column, end in ends if column == name) for name, _ in ends}
     return Buffer(
-        state=np.zeros(6, np.int64),
+        state=np.zeros(9, np.int64),
         kind=np.empty(capacity, np.uint8),
         t=np.empty(capacity, np.int64),
         iteration=np.empty(capacity, np.int64),
@@ -118,6 +121,24 @@ def empty_buffer(dof: int, capacity: int) -> Buffer:
 def room(buffer: Buffer) -> int:
     """Number of events that still fit."""
     return len(buffer.kind) - int(buffer.state[COUNT])
+
+
+@inline_helper
+def paused(buffer: Buffer) -> bool:
+    """Whether a kernel is to return, so that its caller can look at the budget and at signals.
+
+    The time of the last event serves as the clock, which costs nothing. That of a logical clock
+    says nothing, so the clock is read then, in one of several calls.
+    """
+    state = buffer.state
+    if state[FIRST_SEQ] + state[COUNT] >= state[UNTIL_SEQ]:
+        return True
+    if state[TICK] == 0:
+        return bool(state[LAST_T] >= state[UNTIL_T])
+    state[ASKED] += 1
+    if state[ASKED] % _ASKED_PER_READING > 0:
+        return False
+    return bool(now_ns() - state[ORIGIN] >= state[UNTIL_T])
 
 
 @inline_helper

@@ -1,5 +1,6 @@
 """The log that a run writes to: it numbers and times events and returns them in batches."""
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,12 +20,20 @@ from brrt.kernels.emit import (
     ORIGIN,
     POINTS,
     TICK,
+    UNTIL_SEQ,
+    UNTIL_T,
     Buffer,
     empty_buffer,
 )
 
 _MAX_DELAY_S = 0.25
 """Age at which events are drained although the batch has room: a live view shows them then."""
+
+_SLICE_S = 0.05
+"""Time after which a kernel returns."""
+
+_EVENTS_PER_CALL = 1 << 40 if COMPILED_CLOCK else 1024
+"""Events after which it returns in any case."""
 
 _PER_EVENT = tuple(name for name in Buffer._fields if name not in ("state", "points"))
 
@@ -46,6 +55,7 @@ class EventLog:
         self.dof = dof
         self.buffer = empty_buffer(dof, capacity)
         self.buffer.state[LAST_T] = -1
+        self.buffer.state[[UNTIL_SEQ, UNTIL_T]] = np.iinfo(np.int64).max
         self.buffer.state[TICK] = 1000 if logical_clock else 0
         # A clock that was never set may be before 1970 or far in the future; files allow neither.
         self.epoch_ns = 0 if logical_clock else min(max(time.time_ns(), 0), LATEST_NS)
@@ -149,6 +159,26 @@ class EventLog:
         if state[TICK]:
             return int((state[FIRST_SEQ] + row) * state[TICK])
         return max(time.perf_counter_ns() - self._origin, int(state[LAST_T]) + 1)
+
+    @property
+    def count(self) -> int:
+        """Number of events since the run began."""
+        return int(self.buffer.state[FIRST_SEQ]) + len(self)
+
+    def allow(self, seconds: float = math.inf, events: int | None = None) -> None:
+        """Let the next kernel run until its caller should look at the budget and at signals.
+
+        Args:
+            seconds: Time that is left; without any, the kernel only emits what it has found.
+            events: Events that the log may have in all; None for no limit.
+        """
+        state, most = self.buffer.state, self.count + _EVENTS_PER_CALL
+        slice_ns = int(min(seconds, _SLICE_S) * 1e9)
+        state[UNTIL_T] = time.perf_counter_ns() - self._origin + slice_ns
+        state[UNTIL_SEQ] = most if events is None else min(most, events)
+        if seconds <= 0:
+            state[UNTIL_SEQ] = 0
+        self.tick()
 
     def tick(self) -> None:
         """Write the time to the buffer, for kernels that cannot read the clock themselves."""

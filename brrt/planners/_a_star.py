@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Status
-from brrt.kernels.emit import Buffer, emit_plan_end, room
+from brrt.kernels.emit import Buffer, emit_plan_end, paused, room
 from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.lattice import (
     BLOCKED,
@@ -28,6 +28,7 @@ from brrt.planners.base.kernel_planner import (
     ENDED,
     LIMIT,
     OWN,
+    PAUSED,
     POINTS,
     STATE_FULL,
 )
@@ -111,6 +112,8 @@ def advance(
             return ENDED
         if counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit:
             return LIMIT
+        if paused(log):
+            return PAUSED
         counts[DRAWS] += 1
         counts[COUNTED] = counts[DRAWS]
         counts[LAST] = best

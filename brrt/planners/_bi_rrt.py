@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Stage, Status
-from brrt.kernels.emit import Buffer, emit_connect, emit_plan_end, emit_reject, emit_sample, room
+from brrt.kernels.emit import (
+    Buffer,
+    emit_connect,
+    emit_plan_end,
+    emit_reject,
+    emit_sample,
+    paused,
+    room,
+)
 from brrt.kernels.forest import ForestArrays, add, emit_roots, emit_tree_path, fits
 from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.kdtree import nearest
@@ -24,6 +32,7 @@ from brrt.planners.base.kernel_planner import (
     ENDED,
     LIMIT,
     OWN,
+    PAUSED,
     POINTS,
     STATE_FULL,
 )
@@ -150,9 +159,11 @@ def advance(
             return BATCH_FULL
         if not fits(forest, 1):
             return STATE_FULL
+        if counts[STAGE] == _DRAW and (counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit):
+            return LIMIT
+        if paused(log):
+            return PAUSED
         if counts[STAGE] == _DRAW:
-            if counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit:
-                return LIMIT
             counts[STAGE] = draw(state, space, rng, log, options)
         linking = counts[STAGE] == _LINK
         tree = counts[TREE]

@@ -12,6 +12,7 @@ from brrt.kernels.emit import (
     emit_heuristic,
     emit_move,
     emit_plan_end,
+    paused,
     room,
 )
 from brrt.kernels.jit import inline_helper, kernel
@@ -43,6 +44,7 @@ from brrt.planners.base.kernel_planner import (
     ENDED,
     LIMIT,
     OWN,
+    PAUSED,
     POINTS,
     STATE_FULL,
 )
@@ -280,6 +282,8 @@ def advance(
             # Stop only here, after learning: runs with different budgets have the same prefix.
             if counts[COUNTED] >= limit or counts[MOVES] >= draw_limit:
                 return LIMIT
+            if paused(log):
+                return PAUSED
             if counts[STEP] + 1 >= len(state.trace):
                 return STATE_FULL
             go(state, log)
@@ -298,6 +302,8 @@ def advance(
                     return LIMIT
                 emit_plan_end(log, counts[MOVES], SOLVED)
                 return ENDED
+            if paused(log):
+                return PAUSED
             if not lattice_has_room(lattice) or not search_has_room(search, lattice):
                 return STATE_FULL
             counts[LOOKAHEAD] = lookahead

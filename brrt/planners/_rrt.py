@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Reason, Source, Stage, Status
-from brrt.kernels.emit import Buffer, emit_plan_end, emit_reject, emit_sample, room
+from brrt.kernels.emit import Buffer, emit_plan_end, emit_reject, emit_sample, paused, room
 from brrt.kernels.forest import ForestArrays, add, emit_roots, emit_tree_path, fits
 from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.kdtree import nearest
@@ -19,6 +19,7 @@ from brrt.planners.base.kernel_planner import (
     ENDED,
     LIMIT,
     OWN,
+    PAUSED,
     POINTS,
     STATE_FULL,
 )
@@ -140,6 +141,8 @@ def advance(
                 continue
         if counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit:
             return LIMIT
+        if paused(log):
+            return PAUSED
         counts[DRAWS] += 1
         source = GOAL if uniform(rng) < options.goal_bias else UNIFORM
         if source == GOAL:

@@ -2,7 +2,8 @@
 
 Each pass of the loop makes one extension, with the choice of a parent and the rewiring: of one tree
 towards the sample or, if there are two, of the other tree towards the newest node of the first. So
-it can stop between any two extensions, and each helper is compiled into it only once.
+each helper is compiled into it only once. It can stop between any two extensions, and within one
+before any motion check.
 """
 
 import math
@@ -19,6 +20,7 @@ from brrt.kernels.emit import (
     emit_reject,
     emit_rewire,
     emit_sample,
+    paused,
     room,
 )
 from brrt.kernels.forest import ForestArrays, add, emit_roots, emit_tree_path, fits
@@ -31,9 +33,9 @@ from brrt.planners.base.kernel_planner import (
     COUNTED,
     DRAWS,
     ENDED,
-    EVENTS,
     LIMIT,
     OWN,
+    PAUSED,
     POINTS,
     STATE_FULL,
 )
@@ -48,16 +50,22 @@ LINK_BLOCKED, NEAR_BLOCKED = int(Reason.LINK_BLOCKED), int(Reason.NEAR_BLOCKED)
 NO_GAIN = int(Reason.NO_GAIN)
 RAW, IMPROVED = int(Stage.RAW), int(Stage.IMPROVED)
 
-STAGE, TREE, TURN, GOAL_NODE, GOAL_NEAR, LINKS, BEST, PATHS, NEWEST = range(OWN, OWN + 9)
-"""Places in `RRTStarState.counts`: the stage, the tree that is being extended, the tree whose turn
-it is, the node at the goal or -1 (of one tree), whether the goal is the next sample because it is
-within reach, the number of links between two trees, the best link or -1, the number of paths, and
-from here on the newest node of each tree (two places)."""
+(
+    STAGE, PART, TREE, TURN, CLOSE, NEAR, NEXT, GOAL_NODE, GOAL_NEAR, LINKS, BEST, PATHS, NEWEST,
+) = range(OWN, OWN + 13)  # fmt: skip
+"""Places in `RRTStarState.counts`: the stage, the part of an extension, the tree that is being
+extended, the tree whose turn it is, the node nearest to the target, the number of nodes near the
+new one and which of them to rewire next, the node at the goal or -1 (of one tree), whether the goal
+is the next sample because it is within reach, the number of links between two trees, the best link
+or -1, the number of paths, and from here on the newest node of each tree (two places)."""
 COUNTS = NEWEST + 2
 
 _BEGIN, _DRAW, _GROW, _LINK, _REPORT = range(5)
 """Stages: emit the roots, draw a sample, extend a tree towards it, extend the other tree towards
 the newest node, emit the path if it is better."""
+
+_STEER, _CHOOSE, _REWIRE = range(3)
+"""Parts of an extension: steer and find the nodes near the new one, choose its parent, rewire."""
 
 _TARGET, _NEW, _GOAL, _START = range(4)
 """Rows of `RRTStarState.scratch`: the configuration that an extension heads for, the new node, goal
@@ -66,9 +74,12 @@ and start."""
 _UNKNOWN, _FREE, _BLOCKED = range(3)
 """Results of the motion checks between the new node and those near it."""
 
-_REPORTED, _LEAST = range(2)
-"""Places in `RRTStarState.best`: the cost of the best path that was emitted, and the least cost
-over any link."""
+_NO_NODE, _UNFINISHED = -1, -2
+"""Results of an extension that is not a node."""
+
+_REPORTED, _LEAST, _MOVED = range(3)
+"""Places in `RRTStarState.best`: the cost of the best path that was emitted, the least cost over
+any link, and the length of the current extension."""
 
 
 class RRTStarOptions(NamedTuple):
@@ -99,7 +110,7 @@ class RRTStarState(NamedTuple):
         link_far: Length of each link, shape (capacity,).
         linked: The newest link at each node or -1, shape (capacity,).
         counts: See `kernel_planner` and above, shape (COUNTS,).
-        best: See above, shape (2,).
+        best: See above, shape (3,).
         scratch: The target, the new node, goal and start, shape (4, dof).
     """
 
@@ -172,29 +183,29 @@ def reject(
 
 @inline_helper
 def choose_parent(
-    state: RRTStarState,
-    space: Any,
-    log: Buffer,
-    tree: int,
-    nearest_node: int,
-    step: float,
-    count: int,
+    state: RRTStarState, space: Any, log: Buffer, tree: int, nearest_node: int
 ) -> int:
     """Return the parent over which the new node costs least; the nearest node's motion is free.
 
     Candidates are checked in the order of cost, so that usually one motion is checked.
+
+    Returns:
+        The parent; -2 if it is not chosen yet because the loop is to return.
     """
     forest, scratch = state.forest, state.scratch
-    parent, cost = nearest_node, forest.cost[nearest_node] + step
+    parent, cost = nearest_node, forest.cost[nearest_node] + state.best[_MOVED]
     while True:
+        # An event of this function or the new edge, and an event of `link`.
+        if room(log) < 2 or paused(log):
+            return _UNFINISHED
         best, least = -1, cost
-        for a in range(count):
+        for a in range(state.counts[NEAR]):
             if state.known[a] == _UNKNOWN:
                 through = forest.cost[state.near[a]] + state.far[a]
                 if through < least:
                     best, least = a, through
         if best < 0:
-            return parent
+            return int(parent)
         candidate = state.near[best]
         if free(space, forest.q, candidate, scratch, _NEW):
             state.known[best] = _FREE
@@ -257,14 +268,21 @@ def update_costs(state: RRTStarState, node: int) -> None:
 
 
 @inline_helper
-def rewire(state: RRTStarState, space: Any, log: Buffer, tree: int, node: int, count: int) -> None:
-    """Make the new node the parent of the nodes near it whose cost this decreases."""
-    forest = state.forest
-    for a in range(count):
+def rewire(state: RRTStarState, space: Any, log: Buffer, tree: int, node: int) -> bool:
+    """Make the new node the parent of the nodes near it whose cost this decreases.
+
+    Returns:
+        Whether all are rewired; if not, the loop is to return.
+    """
+    forest, counts = state.forest, state.counts
+    for a in range(counts[NEXT], counts[NEAR]):
         other = state.near[a]
         cost = forest.cost[node] + state.far[a]
         if state.known[a] == _BLOCKED or cost >= forest.cost[other]:
             continue
+        if room(log) < 2 or paused(log):
+            counts[NEXT] = a
+            return False
         if state.known[a] == _UNKNOWN and not free(space, forest.q, node, forest.q, other):
             reject(state, log, tree, node, NEAR_BLOCKED, forest.q, other)
             continue
@@ -273,7 +291,36 @@ def rewire(state: RRTStarState, space: Any, log: Buffer, tree: int, node: int, c
         add_child(state, other, node)
         update_costs(state, other)
         number, parent = forest.number[other], forest.number[node]
-        emit_rewire(log, state.counts[DRAWS], tree, number, parent, cost)
+        emit_rewire(log, counts[DRAWS], tree, number, parent, cost)
+    return True
+
+
+@inline_helper
+def begin_extension(
+    state: RRTStarState, space: Any, log: Buffer, options: RRTStarOptions, tree: int
+) -> bool:
+    """Steer to a new configuration and find the nodes near it; return whether it is reached."""
+    forest, counts, scratch = state.forest, state.counts, state.scratch
+    close = nearest(forest.neighbours, space, scratch, _TARGET, tree)
+    moved = steer(space, forest.q, close, scratch, _TARGET, options.step, scratch, _NEW)
+    if moved == 0.0:
+        reject(state, log, tree, close, NO_PROGRESS, scratch, _NEW)
+        return False
+    if options.informed and counts[PATHS] > 0:
+        there = distance(space, scratch, _START, scratch, _NEW)
+        back = distance(space, scratch, _NEW, scratch, _GOAL)
+        if there + back >= state.best[_REPORTED]:
+            reject(state, log, tree, close, NO_GAIN, scratch, _NEW)
+            return False
+    if not free(space, forest.q, close, scratch, _NEW):
+        reject(state, log, tree, close, COLLISION, scratch, _NEW)
+        return False
+    reach = near_radius(state, space, tree, options)
+    count = near(forest.neighbours, space, scratch, _NEW, tree, reach, state.near, state.far)
+    for a in range(count):
+        state.known[a] = _FREE if state.near[a] == close else _UNKNOWN
+    counts[CLOSE], counts[NEAR], state.best[_MOVED] = close, count, moved
+    return True
 
 
 @inline_helper
@@ -281,40 +328,29 @@ def extend(state: RRTStarState, space: Any, log: Buffer, options: RRTStarOptions
     """Extend a tree towards the target: steer, choose a parent, add, rewire.
 
     Returns:
-        The new node; -1 if there is none; -2 if the log has too little room and nothing was done.
+        The new node; -1 if there is none; -2 if it is not finished because the loop is to return.
     """
     forest, counts, scratch = state.forest, state.counts, state.scratch
     tree = counts[TREE]
-    close = nearest(forest.neighbours, space, scratch, _TARGET, tree)
-    moved = steer(space, forest.q, close, scratch, _TARGET, options.step, scratch, _NEW)
-    if moved == 0.0:
-        reject(state, log, tree, close, NO_PROGRESS, scratch, _NEW)
-        return -1
-    if options.informed and counts[PATHS] > 0:
-        there = distance(space, scratch, _START, scratch, _NEW)
-        back = distance(space, scratch, _NEW, scratch, _GOAL)
-        if there + back >= state.best[_REPORTED]:
-            reject(state, log, tree, close, NO_GAIN, scratch, _NEW)
-            return -1
-    reach = near_radius(state, space, tree, options)
-    count = near(forest.neighbours, space, scratch, _NEW, tree, reach, state.near, state.far)
-    if room(log) < 2 * count + 6:
-        counts[EVENTS] = 2 * count + 6
-        return -2
-    if not free(space, forest.q, close, scratch, _NEW):
-        reject(state, log, tree, close, COLLISION, scratch, _NEW)
-        return -1
-    for a in range(count):
-        state.known[a] = _FREE if state.near[a] == close else _UNKNOWN
-    parent = choose_parent(state, space, log, tree, close, moved, count)
-    node = add(forest, space, log, counts[DRAWS], tree, parent, scratch, _NEW)
-    state.edge[node] = distance(space, forest.q, parent, forest.q, node)
-    state.child[node] = -1
-    if len(state.linked) > 0:
-        state.linked[node] = -1
-    add_child(state, node, parent)
-    rewire(state, space, log, tree, node, count)
-    counts[NEWEST + tree] = node
+    if counts[PART] == _STEER:
+        if not begin_extension(state, space, log, options, tree):
+            return _NO_NODE
+        counts[PART] = _CHOOSE
+    if counts[PART] == _CHOOSE:
+        parent = choose_parent(state, space, log, tree, int(counts[CLOSE]))
+        if parent == _UNFINISHED:
+            return _UNFINISHED
+        node = add(forest, space, log, counts[DRAWS], tree, parent, scratch, _NEW)
+        state.edge[node] = distance(space, forest.q, parent, forest.q, node)
+        state.child[node] = -1
+        if len(state.linked) > 0:
+            state.linked[node] = -1
+        add_child(state, node, parent)
+        counts[NEWEST + tree], counts[NEXT], counts[PART] = node, 0, _REWIRE
+    node = int(counts[NEWEST + tree])
+    if not rewire(state, space, log, tree, node):
+        return _UNFINISHED
+    counts[PART] = _STEER
     return node
 
 
@@ -417,14 +453,16 @@ def advance(
             return BATCH_FULL
         if not fits(state.forest, 1):
             return STATE_FULL
+        if counts[STAGE] == _DRAW and (counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit):
+            return LIMIT
+        if paused(log):
+            return PAUSED
         if counts[STAGE] == _DRAW:
-            if counts[COUNTED] >= limit or counts[DRAWS] >= draw_limit:
-                return LIMIT
             draw(state, space, rng, log, options)
             counts[STAGE] = _GROW
         node = extend(state, space, log, options)
-        if node == -2:
-            return BATCH_FULL
+        if node == _UNFINISHED:
+            continue
         stage = next_stage(state, space, options, node)
         if counts[STAGE] == _LINK:
             link(state, space, log, options)

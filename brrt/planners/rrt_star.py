@@ -142,7 +142,7 @@ def make_kernel(
         link_far=np.empty(n if len(roots) > 1 else 0),
         linked=np.empty(n if len(roots) > 1 else 0, np.int32),
         counts=counts,
-        best=np.array([np.inf, np.inf]),
+        best=np.array([np.inf, np.inf, 0.0]),
         scratch=np.array([problem.start, problem.start, problem.goal, problem.start]),
     )
     state.child[: len(roots)] = -1

@@ -71,9 +71,14 @@ class BranchedRun(RecordedRun):
             iteration -= 1
         else:
             _check_open(recording, iteration, ended, parent, planner)
-        super().__init__(recording, before, scenario, planner, batch)
-        shared = SharedEvents(recording, iteration)
-        run = restored(shared, before, self.problem, self._rng, self._log)
+        while True:
+            super().__init__(recording, before, scenario, planner, batch)
+            shared = SharedEvents(recording, iteration)
+            run = restored(shared, before, self.problem, self._rng, self._log)
+            if run is not None:
+                break
+            _check_unfinished(recording, iteration, ended, until)
+            iteration, ended = iteration - 1, None
         if not after:
             _check_budget(recording, run, shared.t, self.stop)
         run.switch_settings(planner.kernel(self.problem, self.stop), seed)
@@ -170,6 +175,24 @@ def _check_open(
         f"{name_of(recording)}: the run ended with {outcome} at iteration {iteration:,}; branch "
         f"before that (--at-iteration){remedy}"
     )
+
+
+def _check_unfinished(
+    recording: Recording, iteration: int, ended: Status | None, limits: Limits
+) -> None:
+    """Raise unless a run that ended within an iteration may continue after the one before.
+
+    Raises:
+        BrrtError: The iteration was asked for or is the first one, or neither the clock nor an
+            interruption ended it, so that the recording is damaged.
+    """
+    place = f"{name_of(recording)}: planning ended within iteration {iteration:,}"
+    if ended not in (Status.TIME_LIMIT, Status.INTERRUPTED):
+        raise BrrtError(f"{place}, which only the clock or an interruption can do")
+    if iteration == 0:
+        raise BrrtError(f"{place}; there is none to branch after, so plan from the start")
+    if "iteration" in limits:
+        raise BrrtError(f"{place}; branch after iteration {iteration - 1:,} at the latest")
 
 
 def _check_budget(recording: Recording, run: KernelRun, t: int, stop: Stop) -> None:

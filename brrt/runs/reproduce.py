@@ -162,9 +162,10 @@ def _run(recording: Recording, end: "_Ending") -> ReproducedRun:
         scenario = replace(manifest.scenario, shortcuts=end.attempts)
         recording = replace(recording, manifest=replace(manifest, scenario=scenario))
     run = ReproducedRun(recording, draws=end.draws)
-    # A run may have ended before its first draw; a scenario cannot state that.
+    # A run may have ended before its first draw, or within an iteration; a scenario cannot state
+    # that.
     run.stop.draws = run.stop.draws if end.draws is None else end.draws
-    run.stop.time_s = None
+    run.stop.events, run.stop.time_s = end.planned, None
     return run
 
 
@@ -175,6 +176,7 @@ class _Ending:
     Attributes:
         events: Number of events.
         draws: The iteration at which the clock or an interruption ended planning.
+        planned: The number of events before that.
         attempts: Shortcuts after which smoothing was interrupted.
         by_clock: Whether the clock ended planning.
         interrupted: Whether a phase was interrupted.
@@ -184,6 +186,7 @@ class _Ending:
 
     events: int = 0
     draws: int | None = None
+    planned: int | None = None
     attempts: int | None = None
     by_clock: bool = False
     interrupted: bool = False
@@ -212,7 +215,7 @@ class _Ending:
         self.by_clock |= status == Status.TIME_LIMIT
         self.interrupted |= status == Status.INTERRUPTED
         if phase == Phase.PLAN:
-            self.draws = int(event["iteration"])
+            self.draws, self.planned = int(event["iteration"]), int(event["seq"])
         elif phase == Phase.SMOOTH:
             self.attempts = attempts
         else:

@@ -109,14 +109,19 @@ def restored(
     problem: Problem,
     rng: np.random.Generator,
     log: EventLog,
-) -> KernelRun:
+) -> KernelRun | None:
     """Plan again up to the last shared iteration and return the planner in that state.
+
+    Returns:
+        The planner; None if the recording ends within that iteration.
 
     Raises:
         BrrtError: An event differs from the recorded one.
     """
     run = _started(before, problem, rng, log)
     found = first_difference(shared, _replan(run, before, problem, log, shared.iteration))
+    if found is not None and found.left is None:
+        return None
     if found is not None:
         raise BrrtError(
             f"{name_of(shared.recording)}: planned again, the run differs from its recording at "

@@ -31,6 +31,10 @@ _SWITCH_S = 0.0005
 Python's usual interval, for the thread of a sink."""
 
 
+_REHEARSAL_S = 0.01
+"""Planning time of the rehearsal: an iteration may take long."""
+
+
 class Solver(Protocol):
     """What every planner has; the base class `Planner` adds settings that check themselves."""
 
@@ -96,8 +100,8 @@ class Run:
         )
 
     def _compile(self) -> None:
-        """Load or compile the kernels by one iteration, before the run's clock starts."""
-        problem, stop = self.problem, Stop(iterations=1)
+        """Load or compile the kernels by an iteration or a part of one, before the clock starts."""
+        problem, stop = self.problem, Stop(iterations=1, time_s=_REHEARSAL_S)
         rng, log = np.random.Generator(np.random.PCG64(0)), EventLog(problem.dof, 4096)
         for _ in self._planner.solve(problem, rng, log, stop):
             pass

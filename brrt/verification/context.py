@@ -92,12 +92,21 @@ class Context:
 
     def end(self) -> None:
         """Go on to the last iteration, once all events have been read."""
-        self.iterations = self._timeline.rest()
+        rows = self._timeline.rest()
+        if self.may_be_unfinished and not self.is_cut:
+            # What follows planning does not follow from an iteration that was not finished.
+            rows = rows[rows["seq"] < self._planned["seq"][-1]]
+        self.iterations = rows
 
     @property
     def is_cut(self) -> bool:
         """Whether the run's end is missing."""
         return self.result is None
+
+    @property
+    def may_be_unfinished(self) -> bool:
+        """Whether the last iteration may lack events: the clock or an interruption may end it."""
+        return self.is_cut or self.outcome in (Status.TIME_LIMIT, Status.INTERRUPTED)
 
     @cached_property
     def events(self) -> Events:
@@ -159,7 +168,12 @@ class Context:
     @cached_property
     def outcome(self) -> Status | None:
         """How planning ended; None if the log does not state that."""
-        phases = self.events[Kind.PHASE]
-        ends = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)]
-        last = int(ends["status"][-1]) if len(ends) else -1
+        last = int(self._planned["status"][-1]) if len(self._planned) else -1
         return Status(last) if last in set(Status) else None
+
+    @cached_property
+    def _planned(self) -> Table:
+        """The events that end planning."""
+        phases = self.events[Kind.PHASE]
+        ends: Table = phases[(phases["name"] == Phase.PLAN) & (phases["status"] != Status.BEGIN)]
+        return ends

@@ -5,6 +5,7 @@ a NamedTuple with the field `counts`. It returns one of the codes below, and con
 when it is called again.
 """
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
@@ -21,14 +22,15 @@ from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario.scenario import UNLIMITED
 
-BATCH_FULL, STATE_FULL, LIMIT, ENDED = range(4)
-"""Why a loop returned: the log is full, its own arrays are full, its iterations or draws are used
-up, or it has emitted the end of planning."""
+BATCH_FULL, STATE_FULL, PAUSED, LIMIT, ENDED = range(5)
+"""Why a loop returned: the log is full, its own arrays are full, it is to pause (see
+`emit.paused`), perhaps within an iteration, its iterations or draws are used up, or it has emitted
+the end of planning."""
 
-DRAWS, COUNTED, EVENTS, POINTS = range(4)
-"""First places of `counts`: draws made, iterations that count, and the events and waypoints that
-the log must have room for before the loop can continue, if that is more than usual."""
-OWN = 4
+DRAWS, COUNTED, POINTS = range(3)
+"""First places of `counts`: draws made, iterations that count, and the waypoints that the log must
+have room for before the loop can continue."""
+OWN = 3
 """First place of `counts` that a loop may use for itself."""
 
 State = TypeVar("State", bound=Any)
@@ -91,6 +93,8 @@ class KernelRun:
     def advance(self, stop: Stop) -> Generator[Events, None, Status | None]:
         """Yield batches of events up to the end of a budget.
 
+        The clock, an interruption and a limit of events end it within an iteration too.
+
         Returns:
             Why it ended, which is not in the log yet; None if the loop has emitted the end of
             planning.
@@ -100,10 +104,14 @@ class KernelRun:
         while not self._ended:
             if log.overdue:
                 yield log.drain()
-            due = stop.reached(self.counted, log.elapsed_s - self._began)
-            # If a stop is due, the loop still emits what it has found.
-            limit = self.counted if due is not None else self.counted + stop.share(self.counted)
-            log.tick()
+            elapsed = log.elapsed_s - self._began
+            due = stop.reached(self.counted, elapsed)
+            # If a stop is due, the loop still emits what it has found; a count lets it finish the
+            # iteration too.
+            limit = stop.iterations if due is None else self.counted
+            left = math.inf if stop.time_s is None else stop.time_s - elapsed
+            at_once = due in (Status.TIME_LIMIT, Status.INTERRUPTED)
+            log.allow(0.0 if at_once else left, stop.events)
             state, options, space = kernel.state, kernel.options, self._space
             result = self._advance(
                 state, space, self._draws, log.buffer, options, limit, draw_limit
@@ -112,13 +120,13 @@ class KernelRun:
                 self._ended = True
             elif result == BATCH_FULL:
                 yield log.drain()
-                log.reserve(int(counts[EVENTS]), int(counts[POINTS]))
+                log.reserve(0, int(counts[POINTS]))
             elif result == STATE_FULL:
                 kernel.state = kernel.enlarged(state)
-            elif due is None and counts[DRAWS] >= draw_limit:
-                return Status.ITERATION_LIMIT
-            elif due is not None:
+            elif due is not None and (at_once or result == LIMIT):
                 return due
+            elif counts[DRAWS] >= draw_limit if result == LIMIT else stop.events == log.count:
+                return Status.ITERATION_LIMIT
         return None
 
     def switch_settings(self, kernel: Kernel[Any], seed: int | None) -> None:

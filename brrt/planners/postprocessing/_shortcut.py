@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.kernels.emit import Buffer, emit_shortcut, room
+from brrt.kernels.emit import Buffer, emit_shortcut, paused, room
 from brrt.kernels.jit import inline_helper, kernel
 from brrt.kernels.random import Random, uniform
 from brrt.kernels.space import distance, segment_free
@@ -36,7 +36,7 @@ def shorten(
     iteration: int,
     attempts: int,
 ) -> None:
-    """Make attempts until there are `attempts`, the path is one motion, or the log is full.
+    """Make attempts until there are `attempts`, the path is one motion, or it is to pause.
 
     Args:
         path: Waypoints, shape (n, dof); shortened in place.
@@ -50,7 +50,9 @@ def shorten(
     """
     if counts[ATTEMPTS] == 0:
         cost[0] = path_cost(path, counts[WAYPOINTS], space)
-    while room(log) > 0 and counts[ATTEMPTS] < attempts and counts[WAYPOINTS] > 2:
+    while counts[ATTEMPTS] < attempts and counts[WAYPOINTS] > 2:
+        if room(log) < 1 or paused(log):
+            return
         n = counts[WAYPOINTS]
         counts[ATTEMPTS] += 1
         i, j = 0, 0

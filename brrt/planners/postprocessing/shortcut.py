@@ -49,12 +49,12 @@ class Shortcut(Settings):
         draws = copy_state(rng)
         points, counts, cost = path.copy(), np.array([len(path), 0]), np.zeros(1)
         while True:
-            log.tick()
+            log.allow()
             _shortcut.shorten(
                 points, counts, cost, space, draws, log.buffer, iteration, self.attempts
             )
             waypoints, made = (int(n) for n in counts)
-            if log.room < 2:
+            if log.room < 2 or log.overdue:
                 yield log.drain()
             if stop.interrupted or made >= self.attempts or waypoints <= 2:
                 break

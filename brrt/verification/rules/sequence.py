@@ -91,7 +91,7 @@ class Extensions(IterationRule):
         sample, edge = rows["kind"] == Kind.SAMPLE, rows["kind"] == Kind.EDGE
         first = np.flatnonzero(sample)
         # The last row is an appended sample, unless the log ends; a cut log may end anywhere.
-        n = len(first) - int(not last or self.context.is_cut)
+        n = len(first) - int(not last or self.context.may_be_unfinished)
         if not len(first) or not n:
             return
         added = np.add.reduceat(edge.astype(np.int64), first)[:n]

@@ -179,7 +179,7 @@ class GoalAttempts(IterationRule):
         limit = (contract.step or 0.0) * (1 - CLOSE) - context.tolerance
         due = (rows["kind"] == Kind.EDGE) & (contract.line_of_sight | (far < limit))
         over = np.isin(after["kind"], [Kind.SAMPLE, Kind.PHASE, Kind.REJECT, Kind.PATH])
-        if last and context.is_cut:
+        if last and context.may_be_unfinished:
             over[-1] = False
         nodes, far = rows[due], far[due]
         self.judge(
@@ -197,7 +197,7 @@ class LinkAttempts(IterationRule):
             return
         if contract.near is None:
             self._judge_order(rows if last else followed(rows), growth)
-        elif not (last and self.context.is_cut):
+        elif not (last and self.context.may_be_unfinished):
             self._judge_aims(rows)
 
     def _judge_order(self, rows: Table, growth: Growth) -> None:
@@ -280,7 +280,7 @@ class Meetings(IterationRule):
     def judge_rows(self, rows: Table, contract: Contract, growth: Growth, *, last: bool) -> None:
         if contract.near is None or contract.link is None:
             return
-        if last and self.context.is_cut:
+        if last and self.context.may_be_unfinished:
             rows = rows[: last_where(rows["kind"] == Kind.SAMPLE)[-1]]
         if len(rows):
             rows = np.concatenate([self.newest, rows])

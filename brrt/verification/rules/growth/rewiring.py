@@ -144,7 +144,8 @@ class Rewirings(JoinedRule):
         context, tree, at, other = self.context, joined.tree, joined.at, joined.other
         edges, all_edges = tree.edges[joined.rows], tree.edges
         # All rewires that follow from a node precede the next node.
-        ends = np.append(all_edges["seq"][1:] - 1, -1 if context.is_cut else 1 << 62)[joined.rows]
+        end = -1 if context.may_be_unfinished else 1 << 62
+        ends = np.append(all_edges["seq"][1:] - 1, end)[joined.rows]
         through, now = joined.cost[at] + joined.far, joined.costs(np.maximum(ends, 0))
         event = edges[at]
         here = _keys(event["iteration"], event["tree"], other, np.asarray(event["q"]))
@@ -174,7 +175,7 @@ class PathsReported(Rule):
         # A path is reported at the end of an iteration, in which each of two trees may grow.
         ends = np.diff(edges["iteration"]) > 0
         moments = edges["seq"][1:][ends] - 1
-        moments = moments if context.is_cut else np.append(moments, 1 << 62)
+        moments = moments if context.may_be_unfinished else np.append(moments, 1 << 62)
         routes = list(self._routes())
         stride = max(1, int(np.ceil(len(moments) * len(routes) / _MOMENTS)))
         moments = moments[::-1][::stride][::-1]
