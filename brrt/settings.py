@@ -10,8 +10,14 @@ from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields
 from typing import Any, Literal, Self, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 from brrt.digits import against_limits
 from brrt.errors import BrrtError, unknown
+
+MOST, MOST_WHOLE = 1e150, (1 << 63) - 1
+"""Greatest number and whole number of a setting that declares none: squares do not overflow, and
+kernels count with 64 bits. The least number above 0 is 1 / MOST."""
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
@@ -171,15 +177,15 @@ def _typed(name: str, value: Any, hint: Any) -> Any:
 
 def _as_number(name: str, value: Any, hint: Any) -> Any:
     try:
-        if isinstance(value, bool):
+        if isinstance(value, bool | np.bool_):
             raise TypeError  # noqa: TRY301 - bool is a subclass of int
         number = hint(float(value)) if hint is int and _is_scientific(value) else hint(value)
     except (TypeError, ValueError, OverflowError):
         kind = "a whole number" if hint is int else "a number"
-        raise BrrtError(f"{name} must be {kind}, not {value!r}") from None
-    inexact = isinstance(value, float) or _is_scientific(value)
+        raise BrrtError(f"{name} must be {kind}, not {value!r:.60}") from None
+    inexact = isinstance(value, float | np.floating) or _is_scientific(value)
     if hint is int and inexact and float(value) != number:
-        raise BrrtError(f"{name} must be a whole number, not {value!r}")
+        raise BrrtError(f"{name} must be a whole number, not {value!r:.60}")
     return number
 
 
@@ -201,15 +207,19 @@ def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:
         return
     if isinstance(value, float) and not math.isfinite(value):
         raise BrrtError(f"{name} must be a finite number, not {value}")
+    whole = isinstance(value, int)
+    most_of_all = MOST_WHOLE if whole else MOST
     low, above, high = meta["low"], meta["above"], meta["high"]
-    text = _text(value)
+    high = most_of_all if high is None else high
+    if low is None:
+        low = -most_of_all if above is None else 1 / MOST if above == 0 else above
+    text = f"{_text(value):.60}"
     if above is not None and value <= above:
         raise BrrtError(f"{name} must be above {above:g}, not {text}")
-    least, most = (f"{limit:g}" for limit in (low or 0, high or 0))
-    if isinstance(value, float):
-        limits = (-math.inf if low is None else low, math.inf if high is None else high)
-        text, least, most = against_limits(value, *limits)
-    if low is not None and value < low:
+    least, most = (f"{limit:,}" for limit in (low, high))
+    if not whole:
+        text, least, most = against_limits(value, low, high)
+    if value < low:
         raise BrrtError(f"{name} must be at least {least}, not {text}")
-    if high is not None and value > high:
+    if value > high:
         raise BrrtError(f"{name} must be at most {most}, not {text}")

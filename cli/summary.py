@@ -30,7 +30,9 @@ def _rows(m: Mapping[str, Any], branches: Iterable[str]) -> Iterator[tuple[str, 
         yield "branched", f"from {branch}"
     yield "outcome", _outcome(m)
     time = "" if m["plan_time_s"] is None else f" in {seconds(m['plan_time_s'])}"
-    yield "planned", f"{counted(m['iterations'], 'iteration')}{time}"
+    made, draws = m.get("counted_iterations", m["iterations"]), m["iterations"]
+    failed = "" if made == draws else f", {counted(draws, 'draw')}"
+    yield "planned", f"{counted(made, 'iteration')}{failed}{time}"
     counts = ", ".join(
         count.text(m[count.key])
         for kind, count in COUNTS.items()

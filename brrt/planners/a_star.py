@@ -15,7 +15,7 @@ from brrt.kernels.lattice import (
     rooted_lattice,
 )
 from brrt.planners import _a_star
-from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
+from brrt.planners.base.kernel_planner import MOST_DRAWS, Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.robots import Point
@@ -25,9 +25,6 @@ from brrt.settings import param
 
 _FIRST_ROOM = 1 << 18
 """Cells to allocate at first, where the bounds hold more."""
-
-MOST_DRAWS = 1 << 62
-"""A search draws nothing, so draws do not limit it."""
 
 
 @dataclass(frozen=True, slots=True)

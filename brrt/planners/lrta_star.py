@@ -7,8 +7,8 @@ import numpy as np
 
 from brrt.kernels.lattice import empty_search, enlarged_lattice, enlarged_search
 from brrt.planners import _lrta_star
-from brrt.planners.a_star import MOST_DRAWS, LatticePlanner
-from brrt.planners.base.kernel_planner import Kernel
+from brrt.planners.a_star import LatticePlanner
+from brrt.planners.base.kernel_planner import MOST_DRAWS, Kernel
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario import contract

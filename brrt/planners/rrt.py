@@ -7,7 +7,7 @@ import numpy as np
 
 from brrt.kernels.forest import enlarged_forest, rooted_forest
 from brrt.planners import _rrt
-from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
+from brrt.planners.base.kernel_planner import MOST_DRAWS, Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.scenario.contract import Contract, Draws, Growth
@@ -72,10 +72,8 @@ class RRT(KernelPlanner):
             scratch=np.array([problem.start, problem.start, problem.goal]),
         )
         state.counts[_rrt.GOAL_NODE] = -1
-        draws = 1 if self.count_failed else _DRAWS_PER_ITERATION
-        return Kernel(
-            _rrt.advance, state, options, _enlarged, options.slices + 4, draws * stop.iterations
-        )
+        draws = MOST_DRAWS if self.count_failed else _DRAWS_PER_ITERATION * stop.iterations
+        return Kernel(_rrt.advance, state, options, _enlarged, options.slices + 4, draws)
 
 
 def _enlarged(state: _rrt.RRTState) -> _rrt.RRTState:

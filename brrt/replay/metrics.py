@@ -22,13 +22,14 @@ class Metrics:
 
     Attributes:
         counts: Number of events of each kind, 0 included.
-        iterations: The last event's iteration.
+        draws: The last event's iteration.
     """
 
     def __init__(self, manifest: Manifest) -> None:
         self._scenario = manifest.scenario
         self.counts = dict.fromkeys(Kind, 0)
-        self.iterations = self._last_t = 0
+        self.draws = self._last_t = 0
+        self._counted = _CountedIterations(manifest)
         self._raw: Path | None = None
         self._smoothed: Path | None = None
         self._first: tuple[Instant, float] | None = None
@@ -45,7 +46,7 @@ class Metrics:
         for kind, count in events.counts.items():
             self.counts[kind] += count
         last = events.last
-        self.iterations = max(self.iterations, last.iteration)
+        self.draws = max(self.draws, last.iteration)
         self._last_t = max(self._last_t, last.t)
         for event in events[Kind.PATH]:
             self._take_path(event, events.dof)
@@ -59,6 +60,7 @@ class Metrics:
                 self._began[phase] = int(event["t"])
             else:
                 self._ended[phase] = (int(event["t"]), status)
+        self._counted.write(events[Kind.EDGE])
         self._moves.write(events[Kind.MOVE], self._began.get(Phase.PLAN, 0))
 
     def _take_path(self, event: Any, dof: int) -> None:
@@ -70,6 +72,11 @@ class Metrics:
         self._raw = path
         if self._first is None:
             self._first = Instant(int(event["t"]), int(event["iteration"])), path[0]
+
+    @property
+    def iterations(self) -> int:
+        """The iterations that a limit counts: all, or all but draws that failed."""
+        return self._counted.total(self.draws)
 
     @property
     def solved(self) -> bool:
@@ -115,7 +122,8 @@ class Metrics:
             "seed": scenario.seed,
             "solved": self.solved,
             "status": self.status,
-            "iterations": self.iterations,
+            "iterations": self.draws,
+            "counted_iterations": self.iterations,
             "events": sum(self.counts.values()),
             "nodes": self.counts[Kind.EDGE],
             **{count.key: self.counts[kind] for kind, count in COUNTS.items() if count.key},
@@ -140,6 +148,39 @@ class Metrics:
             "first_path_iteration": iteration,
             "first_path_cost": _finite(cost),
         }
+
+
+class _CountedIterations:
+    """The iterations that a limit counts: where failed draws do not count, those with a new node.
+
+    Args:
+        manifest: What was run; each of its stretches counts by its own settings.
+    """
+
+    def __init__(self, manifest: Manifest) -> None:
+        self._ends = [branch.iteration for branch in manifest.branches]
+        self._all = [
+            contract.growth.counts_failed
+            if contract is not None and contract.growth is not None
+            else scenario.params.get("count_failed", True) is not False
+            for contract, (_, scenario) in zip(manifest.contracts, manifest.stretches, strict=True)
+        ]
+        self._joined, self._last = np.zeros(len(self._all), np.int64), 0
+
+    def write(self, edges: Table) -> None:
+        """Take the edges of a batch."""
+        if not all(self._all) and len(edges):
+            joins = np.unique(edges["iteration"])
+            joins = joins[joins > self._last]
+            self._joined += np.bincount(
+                np.searchsorted(self._ends, joins), minlength=len(self._all)
+            )
+            self._last = max(self._last, int(edges["iteration"][-1]))
+
+    def total(self, last: int) -> int:
+        """Return the number of iterations up to the last one."""
+        made = np.diff([0, *(min(end, last) for end in self._ends), last])
+        return int(np.where(self._all, made, self._joined).sum())
 
 
 class _Moves:

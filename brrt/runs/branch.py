@@ -81,6 +81,7 @@ class BranchedRun(RecordedRun):
             iteration, ended = iteration - 1, None
         if not after:
             _check_budget(recording, run, shared.t, self.stop)
+        seed = None if seed is None else scenario.seed
         run.switch_settings(planner.kernel(self.problem, self.stop), seed)
         self._planner = Continuation(run, shared)
         here = Branch(

@@ -1,7 +1,6 @@
 """Run a scenario: plan, smooth, execute, and pass every event to the sinks."""
 
 import platform
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -21,15 +20,14 @@ from brrt.planners.postprocessing.execute import Execute
 from brrt.planners.postprocessing.shortcut import Shortcut
 from brrt.recording import Memory, Recording, Result, Sink
 from brrt.replay.metrics import Metrics
+from brrt.runs.switch_interval import short_switch_interval
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
 from brrt.settings import Settings
 from brrt.worlds.world import World
 
-_SWITCH_S = 0.0005
-"""Switch interval of threads during a run: between two batches the planner must not wait 5 ms,
-Python's usual interval, for the thread of a sink."""
-
+_LONG_PATH = 10
+"""Length of a long path, in longest sides of its world."""
 
 _REHEARSAL_S = 0.01
 """Planning time of the rehearsal: an iteration may take long."""
@@ -82,6 +80,8 @@ class Run:
         self._planner, self.problem = planner, problem
         self._smoother = Shortcut(attempts=scenario.shortcuts) if scenario.smooth else None
         self._execute = Execute(max_move=scenario.max_move) if scenario.execute else None
+        if self._execute is not None:
+            self._execute.check(_LONG_PATH * problem.world.extent, "this world")
         self._compile()
         self._log = EventLog(problem.dof, batch, logical_clock=scenario.clock == "logical")
         self._rng = np.random.Generator(np.random.PCG64(scenario.seed))
@@ -144,6 +144,8 @@ class Run:
                 yield batch
         # A planner that moves while it plans has reached the goal by now.
         if self._execute is not None and not moved and not self.stop.interrupted:
+            motions = self.problem.robot.distance(waypoints[:-1], waypoints[1:])
+            self._execute.check(float(np.sum(motions)), "this path")
             yield from self._execute.follow(waypoints, space, self._log, self.stop, iteration)
 
     def execute(
@@ -158,18 +160,16 @@ class Run:
         sinks = list(sinks)
         metrics = Metrics(self.manifest)
         result: Result | None = None
-        usual = sys.getswitchinterval()
         try:
-            sys.setswitchinterval(_SWITCH_S)
-            for batch in self.events():
-                for sink in sinks:
-                    sink.write(batch)
-                metrics.write(batch)
-                if watch is not None:
-                    watch(metrics)
+            with short_switch_interval():
+                for batch in self.events():
+                    for sink in sinks:
+                        sink.write(batch)
+                    metrics.write(batch)
+                    if watch is not None:
+                        watch(metrics)
             result = metrics.as_dict() if sinks else None  # long paths take milliseconds
         finally:
-            sys.setswitchinterval(usual)
             _close_all(sinks, result)
         return metrics
 

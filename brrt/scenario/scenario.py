@@ -1,5 +1,6 @@
 """A scenario: everything that determines a run, as users write it and files store it."""
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
@@ -10,10 +11,14 @@ import numpy as np
 
 from brrt.errors import BrrtError, unknown
 from brrt.robots import Robot, make_robot, names_robot_file
+from brrt.settings import MOST
 from brrt.worlds import world_beside
 
 RANDOM: Literal["random"] = "random"
 """A start or goal that is drawn from the scenario's seed."""
+
+_LONGEST_S = 1e9
+"""Greatest time in seconds: 31 years, whose nanoseconds fit into 64 bits."""
 
 UNLIMITED = 10**15
 """A limit that no count of a run reaches; fits into 64 bits."""
@@ -72,6 +77,14 @@ class Scenario:
         Raises:
             BrrtError: A name is unknown or a number out of range.
         """
+        given: Any = self.params
+        params = {} if given is None else given
+        if not isinstance(params, Mapping):
+            raise BrrtError("params must be a table of names and values")
+        plain = {"params": {name: _plain(value) for name, value in params.items()}}
+        plain |= {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name != "params"}
+        for name, value in plain.items():
+            object.__setattr__(self, name, value)
         for name in ("world", "robot", "planner", "clock"):
             if not isinstance(getattr(self, name), str):
                 raise BrrtError(f"{name} must be a text, not {getattr(self, name)!r}")
@@ -79,7 +92,7 @@ class Scenario:
             if not isinstance(getattr(self, name), bool):
                 raise BrrtError(f"{name} must be true or false, not {getattr(self, name)!r}")
         for name in ("start", "goal"):
-            if isinstance(getattr(self, name), str):
+            if getattr(self, name) is not None:
                 object.__setattr__(self, name, _configuration(name, getattr(self, name)))
         object.__setattr__(self, "robot", _robot(self.robot))
         if self.clock not in ("real", "logical"):
@@ -87,15 +100,21 @@ class Scenario:
         self._check_numbers()
 
     def _check_numbers(self) -> None:
-        _whole("seed", self.seed, low=0)
-        _whole("shortcuts", self.shortcuts, low=0)
-        for name in ("iterations", "draws"):
-            if getattr(self, name) is not None:
-                _whole(name, getattr(self, name), low=1)
-        for name, unit in (("time", " seconds"), ("deadline", " seconds"), ("max_move", "")):
+        for name, low in (("seed", 0), ("shortcuts", 0), ("iterations", 1), ("draws", 1)):
             value = getattr(self, name)
-            if not _positive(value) and not (name == "time" and value is None):
-                raise BrrtError(f"{name} must be above 0{unit}, not {value!r}")
+            if value is not None or name in ("seed", "shortcuts"):
+                object.__setattr__(self, name, _whole(name, value, low=low))
+        for name, high, unit in (
+            ("time", _LONGEST_S, " seconds"), ("deadline", _LONGEST_S, " seconds"),
+            ("max_move", MOST, ""),
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if value is None and name == "time":
+                continue
+            if not _positive(value):
+                raise BrrtError(f"{name} must be above 0{unit}, not {value!r:.60}")
+            if value > high:
+                raise BrrtError(f"{name} must be at most {high:g}{unit}, not {value!r:.60}")
 
     @classmethod
     def parse(cls, values: Mapping[str, Any]) -> Self:
@@ -110,13 +129,7 @@ class Scenario:
         for name in values:
             if name not in names:
                 raise unknown("key of a scenario", name, names)
-        known = dict(values)
-        for name in ("start", "goal"):
-            if known.get(name) is not None:
-                known[name] = _configuration(name, known[name])
-        if not isinstance(known.get("params", {}), Mapping):
-            raise BrrtError("params must be a table of names and values")
-        return cls(**known)
+        return cls(**values)
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -180,13 +193,21 @@ def _positive(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < np.inf
 
 
-def _whole(name: str, value: Any, *, low: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise BrrtError(f"{name} must be a whole number, not {value!r}")
+def _plain(value: Any) -> Any:
+    """Return numpy's numbers and arrays as Python's."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
+def _whole(name: str, value: Any, *, low: int) -> int:
+    """Return a whole number; TOML writes 1e3 as a float."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not math.isfinite(value) or int(value) != value:
+        raise BrrtError(f"{name} must be a whole number, not {value!r:.60}")
     if value < low:
-        raise BrrtError(f"{name} must be at least {low}, not {value}")
+        raise BrrtError(f"{name} must be at least {low}, not {value!r:.60}")
     if name != "seed" and value > UNLIMITED:
-        raise BrrtError(f"{name} must be at most {UNLIMITED:,}, not {value}")
+        raise BrrtError(f"{name} must be at most {UNLIMITED:,}, not {value!r:.60}")
+    return int(value)
 
 
 def _configuration(name: str, value: Any) -> tuple[float, ...] | Literal["random"]:

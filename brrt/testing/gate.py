@@ -145,7 +145,7 @@ def gate(
         BrrtError: A metric is unknown, the seeds are too few to prove anything, or the runs are of
             different problems.
     """
-    numbers = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
+    numbers = list(range(seeds)) if isinstance(seeds, int | np.integer) else list(seeds)
     check_question(numbers, alpha, margins)
     old = _metrics_of(against, "the old runs", numbers)
     found = _metrics_of(new, "the new runs", numbers)
@@ -218,7 +218,7 @@ def check_question(seeds: list[int], alpha: float, margins: Mapping[str, Any]) -
     if not 0 < alpha < 1:
         raise BrrtError(f"alpha must be a probability between 0 and 1, not {alpha!r}")
     for name, margin in margins.items():
-        if not isinstance(margin, int | float) or not 0 <= margin < math.inf:
+        if not isinstance(margin, int | float | np.number) or not 0 <= margin < math.inf:
             raise BrrtError(f"margin of {name} must be from 0 on (0.02: 2 %), not {margin!r}")
     if len(set(seeds)) < len(seeds):
         raise BrrtError("seeds must be different from each other")

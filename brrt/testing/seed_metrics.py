@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from brrt.errors import BrrtError
 from brrt.files import make_folder_of, parse_json, read_text, replacing
 from brrt.recording import Recording
@@ -50,7 +52,7 @@ class SeedMetrics:
         Raises:
             BrrtError: The scenario cannot be run, or the function returned something else.
         """
-        numbers = range(seeds) if isinstance(seeds, int) else list(seeds)
+        numbers = range(seeds) if isinstance(seeds, int | np.integer) else list(seeds)
         scenario = None
         if isinstance(source, Scenario):
             check_repeatable(source)

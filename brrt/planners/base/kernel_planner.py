@@ -33,6 +33,9 @@ have room for before the loop can continue."""
 OWN = 3
 """First place of `counts` that a loop may use for itself."""
 
+MOST_DRAWS = 1 << 62
+"""In place of a limit of draws: iterations limit the run."""
+
 State = TypeVar("State", bound=Any)
 
 

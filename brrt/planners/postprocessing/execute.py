@@ -7,11 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.digits import at_least
+from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.event_log import EventLog
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing import _execute
 from brrt.settings import Settings, param
+
+_MOST_MOVES = 2e9
+"""Moves are counted with 32 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +28,23 @@ class Execute(Settings):
     """
 
     max_move: float = param(1.0, "longest move, in the robot's metric", above=0)
+
+    def check(self, length: float, what: str) -> None:
+        """Raise if a path takes more moves than can be counted.
+
+        Args:
+            length: Its length.
+            what: What is of that length, for the message.
+
+        Raises:
+            BrrtError: It does.
+        """
+        least = length / _MOST_MOVES
+        if self.max_move < least:
+            raise BrrtError(
+                f"max_move {self.max_move:g} is too small for {what}; it must be at least "
+                f"{at_least(least, 2)}"
+            )
 
     def follow(
         self, path: NDArray[np.float64], space: Any, log: EventLog, stop: Stop, iteration: int
