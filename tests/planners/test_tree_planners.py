@@ -219,7 +219,7 @@ def test_start_within_a_step_behind_a_wall(
     assert events[Kind.PATH]["iteration"][0] > 1
 
 
-@pytest.mark.parametrize("step", [1e-20, 1e-300])
+@pytest.mark.parametrize("step", [1e-20, 1e-149])
 @EACH
 def test_a_step_that_is_lost_in_rounding(planner: str, params: dict[str, Any], step: float) -> None:
     """No tree grows on the spot, and connecting does not go on for ever."""
