@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, BinaryIO
 
 from brrt.errors import BrrtError
 
@@ -67,33 +67,59 @@ def readable_name(path: Path) -> Iterator[Path]:
         yield link
 
 
+def open_file(path: Path) -> BinaryIO:
+    """Open a regular file to read it: a pipe blocks who opens it, a device may have no end.
+
+    Raises:
+        OSError: The file cannot be opened, or is something else.
+        ValueError: The name has a zero byte.
+    """
+    _check_regular(os.stat(path))  # noqa: PTH116 - opening a device may have effects
+    return open(path, "rb", opener=_open_without_blocking)  # pathlib has no opener
+
+
+def _open_without_blocking(path: str, flags: int) -> int:
+    number = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))  # it may be a pipe by now
+    try:
+        _check_regular(os.fstat(number))
+    except OSError:
+        os.close(number)
+        raise
+    return number
+
+
+def _check_regular(found: os.stat_result) -> None:
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "is a folder")
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "a pipe or a device; save it to a file first")
+
+
 def read_bytes(path: Path, what: str, most_bytes: int, *, rest: bool = True) -> bytes:
-    """Read a file, pipe or device into bounded memory.
+    """Read a file into bounded memory.
 
     Args:
         path: The file.
         what: What the file should contain, for messages ("a world").
-        most_bytes: Maximum size. A larger file is refused before it is read, an endless device
-            after that many bytes.
+        most_bytes: Maximum size. A larger file is refused before it is read.
         rest: If False, return the first `most_bytes` of a larger file instead of refusing it.
 
     Raises:
         BrrtError: The file cannot be read or is too large.
     """
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             size = os.fstat(file.fileno()).st_size
             if size > most_bytes and rest:
                 raise BrrtError(
                     f"{path}: {size:,} bytes are too many; {what} has at most {most_bytes:,}"
                 )
+            # Files of /proc and /sys state the size 0.
             data = file.read(min(most_bytes, size or most_bytes) + rest)
     except (OSError, ValueError) as error:
         raise BrrtError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > most_bytes:
-        raise BrrtError(
-            f"{path}: more than {most_bytes:,} bytes and no end; {what} has at most {most_bytes:,}"
-        )
+        raise BrrtError(f"{path}: too long; {what} has at most {most_bytes:,} bytes")
     return data
 
 

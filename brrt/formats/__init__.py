@@ -8,7 +8,7 @@ from pathlib import Path
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events
-from brrt.files import is_there
+from brrt.files import open_file
 from brrt.formats.integrity import BrokenError, CutError, DamagedError
 from brrt.formats.mcap.reader import is_whole, read_mcap
 from brrt.formats.mcap.records import MAGIC
@@ -59,9 +59,7 @@ def _first_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: is a folder; name a recording in it, .mcap or .rrd")
-        if not path.is_file() and is_there(path):
-            raise RecordingError(f"{path}: a pipe or a device; save it to a file first")
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return file.read(len(MAGIC))
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None

@@ -107,10 +107,9 @@ def _check_pair(manifest: Manifest, world: World) -> None:
         raise BrrtError(f"damaged: it began {manifest.epoch_ns} ns after 1970")
     if manifest.dim != world.dim:
         raise BrrtError(f"damaged: its world is {world.dim}D instead of {manifest.dim}D")
-    if manifest.robot is not None:
-        dof = manifest.make_robot().dof(world)
-        if dof != manifest.dof:
-            raise BrrtError(f"damaged: its robot needs {dof} numbers instead of {manifest.dof}")
+    dof = manifest.make_robot().dof(world)
+    if dof != manifest.dof:
+        raise BrrtError(f"damaged: its robot needs {dof} numbers instead of {manifest.dof}")
 
 
 class Numbering:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from brrt.errors import BrrtError, unknown
-from brrt.files import read_text
+from brrt.files import is_file, read_text
 from brrt.robots.chain import Chain
 from brrt.robots.point import Point
 from brrt.robots.polygon import Polygon
@@ -38,7 +38,16 @@ def names_robot_file(spec: str) -> bool:
     """Whether a specification names a file, which need not exist."""
     if spec.partition(":")[0] in ROBOTS:
         return False
-    return spec.endswith(".json") or "/" in spec or (bool(spec) and Path(spec).is_file())
+    return _is_marked(spec) or (bool(spec) and is_file(spec))
+
+
+def mark_robot_file(spec: str) -> str:
+    """Return the specification of a file so that it can be told from a robot's name."""
+    return spec if _is_marked(spec) else f"./{spec}"
+
+
+def _is_marked(spec: str) -> bool:
+    return spec.endswith(".json") or "/" in spec
 
 
 def load_robot(path: Path) -> Robot:
@@ -83,6 +92,7 @@ __all__ = [
     "Robot",
     "load_robot",
     "make_robot",
+    "mark_robot_file",
     "names_robot_file",
     "robot_from_json",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 from brrt.errors import BrrtError
-from brrt.robots import Robot, robot_from_json
+from brrt.robots import ROBOTS, Robot, mark_robot_file, names_robot_file, robot_from_json
 from brrt.scenario.contract import Contract
 from brrt.scenario.scenario import Scenario
 
@@ -53,7 +53,7 @@ class Branch:
             TypeError: A field is unknown.
             ValueError: A number is malformed, or below 0.
         """
-        known = {**values, "scenario": Scenario.parse(values["scenario"])}
+        known = {**values, "scenario": _scenario(values["scenario"])}
         known |= {name: int(values[name]) for name in ("iteration", "events")}
         if min(known["iteration"], known["events"]) < 0:
             raise ValueError("a branch before the beginning")
@@ -73,7 +73,7 @@ class Manifest:
         epoch_ns: Wall clock (ns since 1970) at time 0 of the events.
         made_by: Versions of brrt and of its dependencies, and the platform.
         robot: The robot's definition in JSON, resolved in the world; None in recordings made
-            before robots were recorded.
+            before robots were recorded, whose scenario names a robot without a file.
         branches: Where the settings changed, in order, for a run that continues a recorded one.
         contract: What the planner promises, by the settings of `scenario`; None if not stated.
     """
@@ -92,6 +92,19 @@ class Manifest:
     FORMAT, BRANCHED = "1", "2"
     """Runs with branches have a format of their own: a reader that does not know them would apply
     the last settings to the whole run."""
+
+    def __post_init__(self) -> None:
+        """Check that the robot is stated: no file that a recording names is ever opened.
+
+        Raises:
+            BrrtError: It is not, and the scenario names a file.
+        """
+        if self.robot is None and names_robot_file(self.scenario.robot):
+            raise BrrtError(
+                f"the manifest has no robot, and its scenario names the file "
+                f"{self.scenario.robot!r:.80}, which is not opened: the program that writes the "
+                "recording must store the robot's definition in it"
+            )
 
     @property
     def stretches(self) -> tuple[tuple[int, Scenario], ...]:
@@ -157,7 +170,7 @@ class Manifest:
             )
         try:
             return cls(
-                _scenario(texts["scenario"]),
+                _scenario(_json(texts["scenario"])),
                 tuple(map(float, _json(texts["start"]))),
                 tuple(map(float, _json(texts["goal"]))),
                 int(texts["dim"]),
@@ -183,9 +196,14 @@ def _refused(constant: str) -> None:
     raise ValueError(f"{constant} is no number")
 
 
-def _scenario(text: str) -> Scenario:
-    """Read a scenario; world and planner must be in it, since the defaults may be wrong."""
-    values = _json(text)
+def _scenario(values: Any) -> Scenario:
+    """Read a scenario; world and planner must be in it, since the defaults may be wrong.
+
+    No file is looked up: a robot that is unknown here was one.
+    """
+    robot = values.get("robot") if isinstance(values, Mapping) else None
+    if isinstance(robot, str) and robot.partition(":")[0] not in ROBOTS:
+        values = {**values, "robot": mark_robot_file(robot)}
     scenario = Scenario.parse(values)
     for name in ("world", "planner"):
         if name not in values:

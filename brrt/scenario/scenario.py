@@ -10,7 +10,8 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
-from brrt.robots import Robot, make_robot, names_robot_file
+from brrt.files import read_text
+from brrt.robots import Robot, make_robot, mark_robot_file, names_robot_file
 from brrt.settings import MOST
 from brrt.worlds import world_beside
 
@@ -22,6 +23,9 @@ _LONGEST_S = 1e9
 
 UNLIMITED = 10**15
 """A limit that no count of a run reaches; fits into 64 bits."""
+
+_MAX_BYTES = 1_000_000
+"""Of a file; real ones have some hundreds."""
 
 DEFAULT_ITERATIONS = 1_000_000
 """Iterations of a run without a budget, unless its planner has another default."""
@@ -139,10 +143,8 @@ class Scenario:
             BrrtError: The file cannot be read or is not a scenario.
         """
         try:
-            values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-        except OSError as error:
-            raise BrrtError(f"{path}: {error.strerror or error}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            values = tomllib.loads(read_text(path, "a scenario", _MAX_BYTES))
+        except tomllib.TOMLDecodeError as error:
             raise BrrtError(f"{path}: not TOML: {error}") from None
         # Files of the world and the robot are relative to this file.
         world, robot = values.get("world"), values.get("robot")
@@ -186,7 +188,7 @@ def _robot(spec: str) -> str:
     if not names_robot_file(spec):
         make_robot(spec)
         return spec
-    return spec if "/" in spec or spec.endswith(".json") else f"./{spec}"
+    return mark_robot_file(spec)
 
 
 def _positive(value: Any) -> bool:

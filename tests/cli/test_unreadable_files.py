@@ -61,3 +61,43 @@ def test_what_is_no_file(brrt: Callable[..., Result], tmp_path: Path) -> None:
             done = brrt(*command)
             assert (done.code, done.out, done.err.count("\n")) == (2, "", 1), command
             assert done.err.startswith(f"brrt: {name}: ")
+
+
+READERS = (
+    (".mcap", "replay", "{}"), (".rrd", "verify", "{}"), ("", "explain", "{}"),
+    (".toml", "plan", "{}"), ("", "plan", "{}"),
+    *((suffix, "plan", "--world", "{}") for suffix in (".json", ".map", ".scen", ".yaml", ".png",
+                                                       ".txt", ".geojson", "")),
+    (".map", "worlds", "show", "{}"), (".json", "plan", "--robot", "{}"),
+    (".robot", "plan", "--robot", "./{}"), (".mcap", "plan", "--from", "{}"),
+    (".mcap", "recover", "{}", "--out", "x.mcap"),
+    (".mcap", "export", "{}", "--foxglove", "x.mcap"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", READERS, ids=" ".join)
+def test_pipes_without_a_writer(command: tuple[str, ...], brrt: Callable[..., Result]) -> None:
+    """Where a file is read, a pipe, a device or a folder is refused; none of them is waited for."""
+    name = f"what{command[0]}"
+    for make in (
+        os.mkfifo, lambda at: Path(at).symlink_to("/dev/zero"), lambda at: Path(at).mkdir(),
+    ):  # fmt: skip
+        make(name)
+        done = brrt(*(word.replace("{}", name) for word in command[1:]))
+        assert (done.code, done.out, done.err.count("\n")) == (2, "", 1), done.err
+        assert name in done.err
+        assert make is os.mkfifo or Path(name).exists()
+        Path(name).rmdir() if Path(name).is_dir() else Path(name).unlink()
+
+
+@pytest.mark.parametrize("named", ["what.pgm", "what.png"])
+def test_a_map_that_names_a_pipe(named: str, brrt: Callable[..., Result]) -> None:
+    """The image of a ROS map."""
+    os.mkfifo(named)
+    Path("map.yaml").write_text(
+        f"image: {named}\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    )
+    done = brrt("plan", "--world", "map.yaml", "--start", "1,1", "--goal", "2,2")
+    assert (done.code, done.out) == (2, "")
+    assert "a pipe or a device; save it to a file first" in done.err

@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 
 from brrt.errors import BrrtError
 from brrt.events import Kind
+from brrt.files import open_file
 from brrt.formats.integrity import MOST_BYTES
 from brrt.formats.mcap.messages import TOPICS
 from brrt.formats.mcap.records import find_metadata, parse, parse_metadata, read_summary
@@ -51,7 +52,7 @@ def read_ending(path: Path) -> Ending:
     """Read the result and the counts from the end of a file; of a cut file there are none."""
     kinds, statistics, places = dict[int, Kind](), None, list[stock.MetadataIndex]()
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             for opcode, data in read_summary(path, file):
                 if opcode == Opcode.CHANNEL:
                     channel = parse(stock.Channel, data)

@@ -16,6 +16,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
+from brrt.files import open_file
 from brrt.formats.integrity import MOST_BYTES, CutError, DamagedError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -36,7 +37,7 @@ def open_mcap(path: Path) -> IO[bytes]:
         RecordingError: It cannot be read, or is no such file.
     """
     try:
-        file = path.open("rb")
+        file = open_file(path)
         magic = file.read(len(MAGIC))
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None

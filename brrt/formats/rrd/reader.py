@@ -17,7 +17,7 @@ from rerun.chunk import LazyStore, RrdReader
 
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events, Kind
-from brrt.files import readable_name
+from brrt.files import open_file, readable_name
 from brrt.formats.integrity import Numbering, ReplacedError, parse_head
 from brrt.formats.ordering import Waiting
 from brrt.formats.rrd.columns import END, EVENTS, MANIFEST, WORLD, archetype, table_of
@@ -104,7 +104,7 @@ def _check_frames(path: Path) -> None:
         OSError: The file cannot be read.
         RecordingError: It is cut or damaged.
     """
-    with path.open("rb") as file:
+    with open_file(path) as file:
         if file.read(_HEAD)[: len(_MAGIC)] != _MAGIC:
             raise RecordingError(f"{path}: not a Rerun recording")
         size = file.seek(0, SEEK_END)

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from brrt.errors import BrrtError
-from brrt.files import is_file, lines_of, read_bytes, read_text
+from brrt.files import is_file, is_there, lines_of, read_bytes, read_text
 from brrt.settings import param
 from brrt.worlds.arrays import Bools, Floats
 from brrt.worlds.loaders.loader import (
@@ -107,7 +107,7 @@ class GridScenarios(Loader):
             return bare
         remedy = f"{path}:map=PATH"
         named = file_named_in(where, path, name, remedy)
-        if not is_file(named):
+        if not is_there(named):
             raise BrrtError(f"{where}: its map {name[:80]!r} does not exist; give {remedy}")
         return named
 

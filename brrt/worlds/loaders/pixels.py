@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
+from brrt.files import open_file
 
 if TYPE_CHECKING:
     from PIL.ImageFile import ImageFile
@@ -91,7 +92,7 @@ def _decode(path: Path, *, upright: bool) -> Pixels:
             f"{path}: {size:,} bytes are too many; an image has at most {_MOST_BYTES:,}"
         )
     ignoring = warnings.catch_warnings(action="ignore")
-    with ignoring, Image.open(path, formats=_FORMATS) as image:
+    with ignoring, open_file(path) as file, Image.open(file, formats=_FORMATS) as image:
         width, height = image.size
         if width * height > _MOST_PIXELS:
             raise _too_many(path, f"{width:,} x {height:,}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brrt.digits import tell_apart
 from brrt.errors import BrrtError
-from brrt.files import is_file
+from brrt.files import is_there
 from brrt.settings import param
 from brrt.worlds.loaders.loader import Loader, file_named_by_user, file_named_in
 from brrt.worlds.loaders.pixels import Pixels, look_up, read_pixels
@@ -104,7 +104,7 @@ class RosMap(Loader):
         where, name = fields.where("image"), fields.text("image")
         remedy = f"{path}:image=PATH"
         image = file_named_in(where, path, name, remedy)
-        if not name or not is_file(image):
+        if not name or not is_there(image):
             raise BrrtError(f"{where}: the image {name[:80]!r} does not exist; give {remedy}")
         return read_pixels(image, upright=False)
 
