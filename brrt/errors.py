@@ -3,9 +3,15 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from brrt.text import visible
+
 
 class BrrtError(Exception):
     """Bad input or an unusable file; the message is one line that names the remedy."""
+
+    def __str__(self) -> str:
+        """Return the message; what it quotes cannot steer the terminal."""
+        return visible(super().__str__())
 
 
 class RecordingError(BrrtError):

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 from brrt.errors import BrrtError
+from brrt.text import readable
 
 LONGEST_LINE = 10_000
 """Maximum characters of a line of a text format; real lines have about a hundred."""
@@ -24,8 +25,6 @@ MOST_JSON_LISTS = 5_000_000
 """Maximum lists and objects in JSON; each takes about a hundred bytes of memory once parsed."""
 
 _LINE = re.compile(r"([^\r\n]*)(?:\r\n?|\n|\Z)")
-
-_LONE_SURROGATE = re.compile("[\ud800-\udfff]")
 
 _SYNC_S = 1.0
 _CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)
@@ -40,19 +39,6 @@ def is_there(path: Path | str) -> bool:
 def is_file(path: Path | str) -> bool:
     """Whether a path is a file; False where pathlib raises, as for a name that is too long."""
     return os.path.isfile(path)  # noqa: PTH113
-
-
-def readable(text: object) -> str:
-    r"""Return a text that UTF-8 can write: a byte of a file's name that is no text becomes \xff.
-
-    Names of files are bytes. Python keeps those that are not UTF-8 as lone surrogates, which
-    neither files nor terminals take.
-    """
-    return _LONE_SURROGATE.sub(lambda found: _escape(ord(found[0])), str(text))
-
-
-def _escape(code: int) -> str:
-    return f"\\x{code - 0xDC00:02x}" if 0xDC80 <= code <= 0xDCFF else f"\\u{code:04x}"
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
-from brrt.files import readable
+from brrt.text import readable
 
 
 def file_word(path: Path | str) -> str:

@@ -7,6 +7,8 @@ from enum import IntEnum
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from brrt.text import visible
+
 from .streams import output_ended
 
 if TYPE_CHECKING:
@@ -28,10 +30,23 @@ SIGNALLED = 128
 
 @cache
 def console(*, stderr: bool = False) -> "Console":
-    """Return the terminal, or the file, that stdout or stderr goes to."""
-    from rich.console import Console
+    """Return the terminal, or the file, that stdout or stderr goes to.
 
-    return Console(stderr=stderr, highlight=False)
+    Texts are printed with their controls as escapes: before they are laid out where they come as
+    plain strings, and in any case before they are written. Rich's own sequences are separate.
+    """
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class VisibleConsole(Console):
+        def render_str(self, text: str, **how: Any) -> Any:
+            return super().render_str(visible(text), **how)
+
+        def render(self, *args: Any) -> Any:
+            for text, style, control in super().render(*args):
+                yield Segment(text if control else visible(text), style, control)
+
+    return VisibleConsole(stderr=stderr, highlight=False)
 
 
 def complain(message: str) -> None:
@@ -45,7 +60,8 @@ def note(message: str) -> None:
 
 
 def _print_on_stderr(text: str, style: str) -> None:
-    console(stderr=True).print(f"brrt: {text}", style=style, markup=False, soft_wrap=True)
+    shown = visible(f"brrt: {text}", one_line=True)
+    console(stderr=True).print(shown, style=style, markup=False, soft_wrap=True)
 
 
 def announce_compilation() -> None:
@@ -71,12 +87,13 @@ def announce_compilation() -> None:
 
 def print_json(data: Mapping[str, Any]) -> None:
     """Print one object on stdout."""
-    sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
+    text = json.dumps(data, allow_nan=False).replace("\x7f", "\\u007f")
+    sys.stdout.write(text + "\n")
 
 
 def print_line(text: str = "", style: str = "") -> None:
     """Print a line on stdout as it is, however wide the terminal."""
-    console().print(text, style=style, markup=False, soft_wrap=True)
+    console().print(visible(text, one_line=True), style=style, markup=False, soft_wrap=True)
 
 
 def print_lines(lines: Iterable[str]) -> None:
@@ -89,14 +106,14 @@ def print_lines(lines: Iterable[str]) -> None:
 
 def print_rows(rows: Sequence[Mapping[str, str]], *, whole: int = 2) -> None:
     """Print a table of rows with the same keys; the first `whole` columns are not wrapped."""
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=None, pad_edge=False)
     for i, name in enumerate(rows[0]):
         table.add_column(name, style="bold" if i == 0 else "", overflow="fold", no_wrap=i < whole)
     for row in rows:
-        table.add_row(*(escape(row[name]) for name in row))
+        table.add_row(*(Text(visible(row[name], one_line=True)) for name in row))
     console().print(table)
 
 
@@ -109,5 +126,5 @@ def print_pairs(rows: Iterable[tuple[str, str, str]]) -> None:
     table.add_column(style="dim")
     table.add_column(overflow="fold")
     for name, text, style in rows:
-        table.add_row(name, Text(text), style=style)
+        table.add_row(name, Text(visible(text, one_line=True)), style=style)
     console().print(table)

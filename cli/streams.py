@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from typing import Any
 
-from brrt.files import readable
+from brrt.text import readable, visible
 
 _PLAIN = {"·": "-", "…": "."}
 """What stands for a character that the terminal's encoding lacks; others become escapes."""
@@ -16,6 +16,9 @@ _PLAIN = {"·": "-", "…": "."}
 
 class Stream(TextIOWrapper):
     """A text stream that goes to nowhere once it cannot be written.
+
+    Controls in a text are written as escapes, whoever prints it. Rich writes its styles through
+    `rich_proxied_file`; the texts that it styles are escaped by `console.VisibleConsole`.
 
     Attributes:
         error: Why it cannot be written, if so.
@@ -25,6 +28,11 @@ class Stream(TextIOWrapper):
 
     def write(self, text: str) -> int:
         """Write text; return its length, even if it went nowhere."""
+        self.write_styled(visible(text))
+        return len(text)
+
+    def write_styled(self, text: str) -> int:
+        """Write text with escape sequences; return its length, even if it went nowhere."""
         try:
             return super().write(text)
         except OSError as error:
@@ -38,12 +46,27 @@ class Stream(TextIOWrapper):
         except OSError as error:
             self._leave(error)
 
+    @property
+    def rich_proxied_file(self) -> "_Styled":
+        """The stream that consoles of Rich write to instead of this one."""
+        return _Styled(self)
+
     def _leave(self, error: OSError) -> None:
         """Send what is buffered, and what comes, to nowhere."""
         self.error = error
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, self.fileno())
         os.close(null)
+
+
+class _Styled:
+    """A stream whose `write` takes escape sequences; all else is as in the stream itself."""
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream, self.write = stream, stream.write_styled
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 @contextmanager

@@ -178,7 +178,7 @@ def _draw(
 
 def _stem(run: Path) -> str:
     """Return a file's name without its ending, as the viewer can read it."""
-    from brrt.files import readable
+    from brrt.text import readable
 
     return readable(run.stem).replace("\\", "_") if readable(run) != str(run) else run.stem
 

@@ -16,6 +16,7 @@ from .console import (
     note,
     print_json,
     print_line,
+    print_lines,
     print_pairs,
     print_rows,
 )
@@ -147,9 +148,9 @@ def show(
     console().print(drawing, soft_wrap=True)
     print_pairs(_rows(figures))
     if picture is not None:
-        print_line(f"\n{picture}: the picture")
+        print_lines(["", f"{picture}: the picture"])
     if rrd is not None:
-        print_line(f"\n{rrd}: open it with rerun {file_argument(rrd)}")
+        print_lines(["", f"{rrd}: open it with rerun {file_argument(rrd)}"])
 
 
 @app.command(cls=Command)

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from brrt.errors import BrrtError, WriteError
-from brrt.files import readable, replacing
+from brrt.files import replacing
 from brrt.formats import read
 from brrt.formats.integrity import BrokenError
 from brrt.formats.mcap.sink import McapSink
 from brrt.recording import Recording
 from brrt.replay.metrics import Metrics
 from brrt.scenario.manifest import Manifest
+from brrt.text import readable
 from brrt.worlds.world import World
 
 NOTE = "brrt.recovered"

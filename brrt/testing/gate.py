@@ -130,7 +130,7 @@ def gate(
     r"""Judge whether new runs are worse than old ones by more than the margins.
 
         verdict = brrt.gate(new, old, seeds=20, cost=0.02, iterations=0.10)
-        print(*verdict.lines(), sep="\n")
+        print(*map(visible, verdict.lines()), sep="\n")
 
     Args:
         new: A scenario, a function of the seed that returns a run or its metrics, or metrics.

@@ -18,6 +18,7 @@ from brrt.shell import file_argument
 from brrt.testing import golden
 from brrt.testing.gate import ALPHA, SEEDS, Verdict, check_question, gate
 from brrt.testing.seed_metrics import SeedMetrics, Source
+from brrt.text import visible
 
 from .hooks import USAGE
 
@@ -52,7 +53,7 @@ class _GoldenFiles:
 
     def record_renewal(self, message: str) -> None:
         """Record that a file was made or renewed; the test fails at its end."""
-        self._usage.renewed.setdefault(self._node, []).append(message)
+        self._usage.renewed.setdefault(self._node, []).append(visible(message))
 
     def shown(self, path: Path) -> str:
         """Return a file's name as the user can paste it."""
@@ -79,7 +80,7 @@ def _fail(kept: Path, message: str) -> NoReturn:
     """Fail the test, and write the message beside what is kept of the run."""
     __tracebackhide__ = True
     kept.with_suffix(".txt").write_text(message + "\n", "utf-8", "backslashreplace")
-    pytest.fail(message, pytrace=False)
+    pytest.fail(visible(message), pytrace=False)
 
 
 @contextmanager
@@ -213,7 +214,7 @@ class Gate:
                 return self._check(path, SeedMetrics.of(run, numbers), judge)
             verdict = judge(run, against, "gate")
         if not verdict.passed:
-            pytest.fail("\n".join(verdict.lines()), pytrace=False)
+            pytest.fail(visible("\n".join(verdict.lines())), pytrace=False)
         return verdict
 
     def _check(self, path: Path, new: SeedMetrics, judge: Callable[..., Verdict]) -> Verdict:

@@ -83,12 +83,14 @@ class SessionHooks:
         renewed = [line for lines in self._usage.renewed.values() for line in lines]
         if not renewed and not self._unused:
             return
+        from brrt.text import visible
+
         terminalreporter.section("brrt")
         for line in renewed:
             terminalreporter.line(line.partition("\n")[0])
         colour = {"red": True} if self._strict else {"yellow": True}
         for path in self._unused:
-            name = os.path.relpath(path, self._config.invocation_params.dir)
+            name = visible(os.path.relpath(path, self._config.invocation_params.dir))
             terminalreporter.line(f"{name}: no test uses it; delete it", **colour)
 
     @property

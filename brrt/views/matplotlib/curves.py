@@ -160,6 +160,7 @@ def _in_thousands(values: Floats) -> tuple[Floats, str]:
 
 def _draw_curve(ax: Any, curve: Curve, colour: Any, name: str, first: str = "_") -> None:
     """Draw a curve and a dot at the first path, with names for the legend."""
+    name = style.literal(name)
     if curve.first is None:
         ax.plot([], [], color=colour, label=f"{name} (no path)")
         return
@@ -189,7 +190,8 @@ def _draw_band(ax: Any, curves: Sequence[Curve], label: str, colour: Any) -> Non
         x[some], low[some], top[some], step="post", color=colour, alpha=0.2, linewidth=0
     )
     found = np.isfinite(middle)
-    ax.plot(x[found], middle[found], drawstyle="steps-post", color=colour, lw=1.2, label=label)
+    name = style.literal(label)
+    ax.plot(x[found], middle[found], drawstyle="steps-post", color=colour, lw=1.2, label=name)
 
 
 def _groups(recordings: Sequence[Recording]) -> Iterator[tuple[str, list[int]]]:

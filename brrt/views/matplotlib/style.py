@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from brrt.text import readable, visible
 from brrt.views import colours
 from brrt.views.colours import rgb
 from brrt.views.matplotlib.draw_world import need_matplotlib
@@ -79,6 +80,11 @@ def unit_of(seconds: float) -> tuple[float, str]:
         if seconds >= size:
             return size, name
     return 1e-9, "ns"
+
+
+def literal(name: str) -> str:
+    """Return a name as a text of matplotlib that shows it as it is, without formulas."""
+    return visible(readable(name), one_line=True).replace("$", r"\$")
 
 
 def line_width(edges: int) -> float:

@@ -252,7 +252,8 @@ class TreePanel:
     def _text(self, seq: int, cost: float | None) -> str:
         """Return the caption after an event."""
         playback = self.playback
-        words = [self._manifest.scenario.planner, f"iteration {playback.instant(seq).iteration:,}"]
+        planner = style.literal(self._manifest.scenario.planner)
+        words = [planner, f"iteration {playback.instant(seq).iteration:,}"]
         words.append(f"{playback.nodes(seq):,} " + ("cells" if playback.has_cells else "nodes"))
         if cost is not None:
             words.append(f"cost {cost:.4g}")

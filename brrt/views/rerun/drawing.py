@@ -10,7 +10,6 @@ import numpy as np
 import rerun as rr
 
 from brrt.events import Events, Kind, Phase, Status
-from brrt.files import readable
 from brrt.recording import Recording, Result
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import GOAL, START
@@ -115,7 +114,7 @@ class RunDrawing:
 
     def _describe(self, result: Result | None) -> None:
         text = self._title + layout.document(self._manifest, result, self._frame.text)
-        markdown = rr.TextDocument(readable(text), media_type=rr.MediaType.MARKDOWN)
+        markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._rec.log("/run", markdown, static=True)
 
 

@@ -10,6 +10,7 @@ from brrt.recording import Result
 from brrt.scenario.contracts import changes_of, planner_settings
 from brrt.scenario.manifest import Manifest
 from brrt.scenario.scenario import Scenario
+from brrt.text import markdown
 from brrt.views.colours import REWIRED, TREE_NAMES
 from brrt.views.rerun import draw_world
 from brrt.worlds.world import World
@@ -69,8 +70,8 @@ def document(manifest: Manifest, result: Result | None = None, coordinates: str 
     for branch, change in zip(manifest.branches, changes_of(manifest), strict=True):
         rows[f"at iteration {branch.iteration:,} of {branch.file}"] = change
     rows = _results(result) | rows
-    table = "".join(f"| {name} | {_cell(value)} |\n" for name, value in rows.items())
-    return f"### {_cell(scenario.planner)}\n\n| | |\n|---|---|\n{table}"
+    table = "".join(f"| {markdown(name)} | {markdown(value)} |\n" for name, value in rows.items())
+    return f"### {markdown(scenario.planner)}\n\n| | |\n|---|---|\n{table}"
 
 
 def _results(result: Result | None) -> dict[str, str]:
@@ -96,10 +97,6 @@ def _budget(scenario: Scenario) -> str:
     if scenario.iterations is not None:
         limits.append(f"{scenario.iterations:,} iterations")
     return ", ".join(limits) or "the planner's own"
-
-
-def _cell(value: object) -> str:
-    return str(value).replace("|", "\\|").replace("\n", " ")
 
 
 def _numbers(values: tuple[float, ...]) -> str:

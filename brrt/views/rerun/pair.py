@@ -9,9 +9,9 @@ import rerun.blueprint as rrb
 from brrt.comparison.difference import Difference
 from brrt.comparison.events import first_difference
 from brrt.events import Events
-from brrt.files import readable
 from brrt.formats.rrd.columns import time_columns
 from brrt.recording import Recording
+from brrt.text import markdown, readable, visible
 from brrt.views.colours import RUNS, Colour
 from brrt.views.rerun import layout
 from brrt.views.rerun.draw.canvas import times_of
@@ -40,7 +40,7 @@ def draw_pair(path: Path, a: Recording, b: Recording) -> Difference | None:
     with rrd_file(path, name, "brrt pair", _layout(runs)) as rec:
         for letter, run, events, colour in zip("AB", runs, logs, RUNS, strict=True):
             below: Any = _Below(rec, letter, colour)
-            drawing = RunDrawing(below, run.manifest, run.world, f"**{run.name}**\n\n")
+            drawing = RunDrawing(below, run.manifest, run.world, f"**{markdown(run.name)}**\n\n")
             drawing.write(events)
             drawing.close(None)
             if difference is not None:
@@ -87,7 +87,8 @@ def _log_difference(rec: Any, events: Events, difference: Difference) -> None:
     """Add a line to the text log at the first event that differs."""
     until = events.until(seq=difference.seq)
     last = max((table[-1] for table in until.tables.values()), key=lambda row: int(row["seq"]))
-    text = rr.TextLog.columns(text=[readable(f"the runs part at {difference}")], level=["WARN"])
+    line = visible(readable(f"the runs part at {difference}"))
+    text = rr.TextLog.columns(text=[line], level=["WARN"])
     rec.send_columns("/difference", time_columns(times_of([last])), text)
 
 
@@ -96,7 +97,9 @@ def _layout(runs: tuple[Recording, Recording]) -> rrb.Blueprint:
     for letter, run in zip("AB", runs, strict=True):
         scenario = run.manifest.scenario
         title = f"{letter}: {run.name} ({scenario.planner}, seed {scenario.seed})"
-        worlds.append(layout.world_view(run.world, below=f"/{letter}", name=readable(title)))
+        worlds.append(
+            layout.world_view(run.world, below=f"/{letter}", name=visible(readable(title)))
+        )
     log = rrb.TextLogView(
         origin="/",
         contents=["/difference", "/A/log", "/B/log"],
