@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 from brrt.errors import BrrtError
+from brrt.output_names import TakenError, check_present, give_name, open_temporary
 from brrt.text import readable
 
 LONGEST_LINE = 10_000
@@ -168,20 +169,27 @@ def lines_of(name: str, text: str) -> Iterator[tuple[int, str]]:
 def replacing(path: Path) -> Iterator[Path]:
     """Write a file under a temporary name and rename it to `path` once it is complete.
 
+    See `expect_new` for a file that exists by then.
+
     Yields:
         The temporary name, in the same folder and with the same suffix.
 
     Raises:
         BrrtError: The file cannot be written.
     """
-    unfinished = _temporary(path)
+    unfinished: Path | None = None
     try:
+        unfinished, number = open_temporary(path)
+        os.close(number)
         yield unfinished
-        unfinished.replace(path)
+        name = give_name(unfinished, path)
     except OSError as error:
         raise BrrtError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
-        unfinished.unlink(missing_ok=True)
+        if unfinished is not None:
+            unfinished.unlink(missing_ok=True)
+    if name != path:
+        raise TakenError(path, name)
 
 
 def make_folder_of(path: Path) -> None:
@@ -212,10 +220,13 @@ class OutputFile:
 
     def __init__(self, path: Path) -> None:
         self._name = Path(os.path.realpath(path))
+        self._wanted = self._name
         self._temporary: Path | None = None
-        if not _is_written_in_place(self._name):
-            self._temporary = _temporary(self._name)
-        self._file = (self._temporary or self._name).open("wb", buffering=0)
+        if _is_written_in_place(self._name):
+            self._file = self._name.open("wb", buffering=0)
+        else:
+            self._temporary, number = open_temporary(self._name)
+            self._file = open(number, "wb", buffering=0)  # noqa: PTH123, SIM115 - a descriptor
         self._dirty, self._closing = False, threading.Event()
         self._error: OSError | None = None
         self._syncing: threading.Thread | None = None
@@ -244,13 +255,18 @@ class OutputFile:
         if self._temporary is None or self.closed:
             return
         _sync(self._file.fileno())
-        temporary, self._temporary = self._temporary, None
-        temporary.replace(self._name)
+        self._name = give_name(self._temporary, self._name)
+        self._temporary = None
         self._syncing = threading.Thread(target=self._keep_synced, name="brrt sync", daemon=True)
         self._syncing.start()
 
     def close(self) -> None:
-        """Close the file; one that has not appeared is deleted."""
+        """Close the file; one that has not appeared is deleted.
+
+        Raises:
+            TakenError: The file has another name, since another process took its own.
+            WriteError: It was removed, or its folder, while it was written.
+        """
         if self.closed:
             return
         self._closing.set()
@@ -261,12 +277,16 @@ class OutputFile:
                 raise self._error
             if self._temporary is None:
                 _sync(self._file.fileno())
+            if self._syncing is not None:
+                check_present(self._wanted, self._file.fileno())
         finally:
             self._file.close()
             if self._temporary is not None:
                 self._temporary.unlink(missing_ok=True)
         if self._syncing is not None:
             _sync_folder(self._name.parent)
+        if self._name != self._wanted:
+            raise TakenError(self._wanted, self._name)
 
     def _keep_synced(self) -> None:
         while not self._closing.wait(_SYNC_S):
@@ -277,10 +297,6 @@ class OutputFile:
                 except OSError as error:
                     self._error = error
                     return
-
-
-def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
 
 
 def _is_written_in_place(path: Path) -> bool:

@@ -126,9 +126,12 @@ def _run(args: Sequence[str] | None) -> int:
                 complain(f"{usage()} (see brrt --help)")
             return Code.BAD_INPUT
         from brrt.errors import BrrtError
+        from brrt.output_names import TakenError
 
         if isinstance(error, BrrtError | OSError):
-            complain(str(error))
+            for each in (error, error.__context__):  # where both files of a run have another name
+                if each is error or isinstance(each, TakenError):
+                    complain(str(each))
         else:
             print_exception(error)  # Python would end with code 1, which says "no path"
     return Code.BAD_INPUT

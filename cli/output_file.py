@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from brrt.errors import BrrtError
+from brrt.output_names import expect_new
 
 
 def check_output(
@@ -28,6 +29,7 @@ def check_output(
         raise BrrtError(f"{option} {path}: exists already; choose another name or add --force")
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise BrrtError(f"{option} {path}: no permission to write there")
+    expect_new(path, new=not force)
 
 
 def check_display(*, view: bool) -> None:

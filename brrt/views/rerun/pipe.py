@@ -10,7 +10,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from brrt.errors import WriteError
+from brrt.errors import BrrtError, WriteError
 from brrt.files import OutputFile
 
 _BLOCK = 1 << 20
@@ -91,7 +91,7 @@ class FilePipe:
         self._try(self._file.appear)
         try:
             self._file.close()
-        except OSError as error:
+        except (OSError, BrrtError) as error:
             self._error = self._error or error
 
     def _try(self, action: Callable[[], None]) -> None:
@@ -103,6 +103,8 @@ class FilePipe:
                 self._error = error
 
     def _check(self) -> None:
+        if isinstance(self._error, BrrtError):
+            raise self._error
         if self._error is not None:
             raise self._write_error(self._error) from None
 
