@@ -1,7 +1,8 @@
 """Decode the records in a chunk of an MCAP file; every length and place may be wrong."""
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from mcap import records
@@ -103,6 +104,21 @@ class ChunkDecoder:
             there = self._waiting.last + 1 - self.numbering.next
             twice = self._waiting.count > there
             raise BrrtError("events are there twice" if twice else "events are missing")
+
+    def check_repeated(self, summary: Iterable[tuple[int, bytes]]) -> None:
+        """Check that schemas and channels in a summary are those that the messages have.
+
+        Raises:
+            BrrtError: One is another.
+        """
+        for opcode, data in summary:
+            known = self._declared.get((opcode, data[:2]), data)
+            if known == data:
+                continue
+            kind: Any = records.Schema if opcode == Opcode.SCHEMA else records.Channel
+            if parse(kind, known) != parse(kind, data):
+                number = int.from_bytes(data[:2], "little")
+                raise BrrtError(f"its summary has another {kind.__name__} {number} than its data")
 
     def _next(self, size: int) -> Events:
         """Return the events that wait if none is missing between them, otherwise none."""

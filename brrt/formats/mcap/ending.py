@@ -1,7 +1,10 @@
 """What the end of an MCAP file says of the run: its result, and how many events were written."""
 
 import json
+import struct
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -26,12 +29,14 @@ class Ending(NamedTuple):
         ended: Whether there is a result, so that the run came to its own end.
         statistics: The counts of all messages; None if they are not there.
         kinds: The kinds of the channels that the summary repeats.
+        records: The records of the summary, opcode and content.
     """
 
     result: Result | None = None
     ended: bool = False
     statistics: stock.Statistics | None = None
     kinds: Mapping[int, Kind] = {}
+    records: Sequence[tuple[int, bytes]] = ()
 
     @property
     def counts(self) -> Mapping[Kind, int]:
@@ -53,7 +58,8 @@ def read_ending(path: Path) -> Ending:
     kinds, statistics, places = dict[int, Kind](), None, list[stock.MetadataIndex]()
     try:
         with open_file(path) as file:
-            for opcode, data in read_summary(path, file):
+            summary = list(read_summary(path, file))
+            for opcode, data in summary:
                 if opcode == Opcode.CHANNEL:
                     channel = parse(stock.Channel, data)
                     if channel.topic in TOPICS:
@@ -63,7 +69,7 @@ def read_ending(path: Path) -> Ending:
                 elif opcode == Opcode.METADATA_INDEX:
                     places.append(parse(stock.MetadataIndex, data))
             result, ended = _result_in(file, places)
-            return Ending(result, ended, statistics, kinds)
+            return Ending(result, ended, statistics, kinds, summary)
     except (OSError, OverflowError, BrrtError):
         return Ending()
 
@@ -78,16 +84,36 @@ def _result_in(
         places: Where the summary says that there is metadata.
     """
     try:
-        if not places:  # the manifest is metadata: this file has no index of it
-            found = find_metadata(file, RESULT)
-            return (None, False) if found is None else (parse_result(found), True)
-        place = next((place for place in reversed(places) if place.name == RESULT), None)
-        if place is None or place.length > MOST_BYTES:
-            return None, place is not None
-        file.seek(place.offset)
-        return parse_result(parse_metadata(file.read(place.length)[9:])), True
+        # The index may be missing or wrong; then the records lead to it.
+        found = None
+        for find in (partial(_indexed_result, file, places), partial(find_metadata, file, RESULT)):
+            with suppress(
+                OSError, ValueError, OverflowError
+            ):  # a wrong place or length may lead anywhere
+                found = found or find()
+        if found is not None:
+            return parse_result(found), True
     except BrrtError:
         return None, True
+    return None, any(place.name == RESULT for place in places)
+
+
+def _indexed_result(
+    file: IO[bytes], places: Sequence[stock.MetadataIndex]
+) -> stock.Metadata | None:
+    """Read the result where the index says; None if it is not there.
+
+    Raises:
+        BrrtError: It is there, and damaged.
+    """
+    for place in places:
+        if place.name == RESULT and 9 < place.length <= MOST_BYTES:
+            file.seek(place.offset)
+            record = file.read(place.length)
+            if record[:9] == struct.pack("<BQ", Opcode.METADATA, place.length - 9):
+                metadata = parse_metadata(record[9:])
+                return metadata if metadata.name == RESULT else None
+    return None
 
 
 def parse_result(metadata: stock.Metadata) -> Result:

@@ -9,11 +9,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
+from hashlib import blake2b
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from mcap.opcode import Opcode
+from mcap.records import Metadata
 from numpy.typing import NDArray
 
 from brrt.errors import BrrtError, RecordingError
@@ -27,7 +29,8 @@ from brrt.formats.integrity import (
 )
 from brrt.formats.mcap.chunks import DECLARATIONS, ChunkDecoder, Index
 from brrt.formats.mcap.compression import unpack_chunk
-from brrt.formats.mcap.ending import parse_result, read_ending
+from brrt.formats.mcap.ending import Ending, parse_result, read_ending
+from brrt.formats.mcap.indexes import Indexes
 from brrt.formats.mcap.records import (
     check_summary,
     open_mcap,
@@ -60,15 +63,16 @@ def read_mcap(path: Path) -> Recording:
             for opcode, data in read_records(path, file):
                 if opcode == Opcode.METADATA:
                     metadata = parse_metadata(data)
-                    texts = metadata.metadata if metadata.name == RUN else texts
+                    texts = metadata.metadata if metadata.name == RUN and not texts else texts
                 elif opcode == Opcode.ATTACHMENT:
                     attachment = parse_attachment(data)
-                    world_json = attachment.data if attachment.name == WORLD else world_json
+                    if attachment.name == WORLD and world_json is None:
+                        world_json = attachment.data
                 elif opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.DATA_END):
                     break
                 if texts is not None and world_json is not None:
                     manifest, world = parse_head(path, texts, world_json)
-                    batches = partial(_batches, path, manifest, texts)
+                    batches = partial(_batches, path, manifest, texts, _digest(world_json))
                     end = read_ending(path)
                     return Recording(manifest, world, batches, end.result, end.counts or None)
     except CutError as error:
@@ -96,14 +100,20 @@ def is_whole(path: Path) -> bool:
     return True
 
 
-def _batches(path: Path, manifest: Manifest, texts: Mapping[str, str]) -> Iterator[Events]:
+def _digest(data: bytes) -> bytes:
+    return blake2b(data).digest()
+
+
+def _batches(
+    path: Path, manifest: Manifest, texts: Mapping[str, str], world: bytes
+) -> Iterator[Events]:
     """Yield the events of each chunk, up to the end or the first damage.
 
     Raises:
         BrokenError: The file is cut or damaged.
         RecordingError: It cannot be read, or is another one than when it was opened.
     """
-    reader = _Reader(path, manifest, texts)
+    reader = _Reader(path, manifest, texts, world)
     try:
         with open_mcap(path) as file:
             yield from reader.batches(file)
@@ -124,14 +134,19 @@ class _Reader:
         path: The file.
         manifest: The run's.
         texts: Those that the manifest was read from.
+        world: Digest of the world's text.
     """
 
-    def __init__(self, path: Path, manifest: Manifest, texts: Mapping[str, str]) -> None:
-        self._path, self._texts = path, texts
+    def __init__(
+        self, path: Path, manifest: Manifest, texts: Mapping[str, str], world: bytes
+    ) -> None:
+        self._path, self._texts, self._world = path, texts, world
+        self._indexes = Indexes()
         self._decoder = ChunkDecoder(manifest.dof, manifest.epoch_ns)
         self._same = self._at_end = False
         self._result: Result | None = None
         self._counts = Counter[Kind]()
+        self._epoch_ns, self._ends = manifest.epoch_ns, list[int]()
 
     def batches(self, file: IO[bytes]) -> Iterator[Events]:
         """Yield the events of each chunk.
@@ -152,26 +167,41 @@ class _Reader:
 
     def _data(self, file: IO[bytes]) -> Iterator[Events]:
         """Yield the events of the data section."""
-        for opcode, data, index in _with_indexes(_joined(read_records(self._path, file))):
+        records = self._indexes.watching(read_records(self._path, file))
+        for opcode, data, index in _with_indexes(_joined(records)):
             if opcode == Opcode.CHUNK:
                 self._check_same()
                 yield from self._counted(self._decoder.events(unpack_chunk(data), index, len(data)))
             elif opcode == _JOINED:
                 yield from self._counted(self._decoder.events(data, index, len(data)))
             elif opcode == Opcode.METADATA:
-                metadata = parse_metadata(data)
-                if metadata.name == RESULT:
-                    self._result = parse_result(metadata)
-                elif metadata.name == RUN:
-                    self._same = self._same or metadata.metadata == self._texts
-                    self._check_same()
+                self._take(parse_metadata(data))
+            elif opcode == Opcode.ATTACHMENT:
+                attachment = parse_attachment(data)
+                if attachment.name == WORLD and _digest(attachment.data) != self._world:
+                    raise BrrtError(f"it has two attachments {WORLD} that differ")
         self._decoder.check_complete()
+
+    def _take(self, metadata: Metadata) -> None:
+        """Take in named texts; the same may be there twice."""
+        if metadata.name == RESULT:
+            result = parse_result(metadata)
+            if self._result not in (None, result):
+                raise BrrtError(f"it has two metadata records {RESULT} that differ")
+            self._result = result
+        elif metadata.name == RUN:
+            if self._same and metadata.metadata != self._texts:
+                raise BrrtError(f"it has two metadata records {RUN} that differ")
+            self._same = metadata.metadata == self._texts
+            self._check_same()
 
     def _counted(self, events: Events) -> Iterator[Events]:
         """Yield a batch, unless it is empty."""
         if len(events):
             self._check_same()
             self._counts.update(events.counts)
+            self._ends += [f(t["t"]) for t in events.tables.values() for f in (np.min, np.max)]
+            self._ends = [min(self._ends), max(self._ends)]
             yield events
 
     def _check_counts(self) -> None:
@@ -192,6 +222,26 @@ class _Reader:
         if end.statistics is not None and end.statistics.message_count != messages:
             why = _differ(end.statistics.message_count, messages, "messages")
             raise DamagedError(self._path, f"damaged: by its statistics, {why}")
+        self._check_indexes(end)
+
+    def _check_indexes(self, end: Ending) -> None:
+        """Check that indexes, times and channels in the summary are those of the records.
+
+        Raises:
+            DamagedError: They are others.
+        """
+        try:
+            self._indexes.check(end.records)
+            self._decoder.check_repeated(end.records)
+        except BrrtError as error:
+            raise DamagedError(self._path, f"damaged: {error}") from None
+        statistics = end.statistics
+        if statistics is None or not self._ends or self._decoder.foreign:
+            return
+        stated = statistics.message_start_time, statistics.message_end_time
+        if stated != tuple(int(t) + self._epoch_ns for t in self._ends):
+            why = "by its statistics, the messages are of other times"
+            raise DamagedError(self._path, f"damaged: {why}")
 
     @property
     def count(self) -> int:
