@@ -81,14 +81,29 @@ def _course(f: Facts) -> Iterator[Row]:
     if len(f.tenths) < 2:
         return
     yield "iteration", _columns(_short(tenth.last) for tenth in f.tenths)
-    for name, values, digits in (
-        ("% new cells" if f.cells else "% accepted", [t.accepted for t in f.tenths], ".0%"),
-        ("us each", [t.us for t in f.tenths], ".3g"),
-        ("to goal", [t.nearest for t in f.tenths], ".3g"),
+    longest = max((t.us for t in f.tenths if t.us is not None), default=0.0)
+    unit, size = next(pair for pair in _UNITS if longest < 1e3 * pair[1] or pair is _UNITS[-1])
+    for name, values, part in (
+        ("% new cells" if f.cells else "% accepted", [_percent(t.accepted) for t in f.tenths], 1.0),
+        (f"{unit} each", [t.us for t in f.tenths], size),
+        ("to goal", [t.nearest for t in f.tenths], 1.0),
     ):
-        texts = ["-" if value is None else f"{value:{digits}}".rstrip("%") for value in values]
         if any(value is not None for value in values):
-            yield name, _columns(texts)
+            yield name, _columns("-" if v is None else _compact(v / part) for v in values)
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else round(100 * share)
+
+
+_UNITS = ("us", 1.0), ("ms", 1e3), ("s", 1e6)
+"""Units of time, and how many microseconds each is."""
+
+
+def _compact(value: float) -> str:
+    """Write a number in 5 characters or less, with 3 digits if they fit."""
+    texts = (f"{value:.{digits}g}" for digits in (3, 2, 1))
+    return next((text for text in texts if len(text) <= 5), f"{value:.0e}")
 
 
 def _columns(values: Iterable[str]) -> str:

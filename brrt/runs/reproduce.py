@@ -12,7 +12,7 @@ from brrt.events import Events, Kind, Phase, Status
 from brrt.planners import PLANNERS, make_planner, make_stop
 from brrt.recording import Recording
 from brrt.runs.resume import BranchedPlan, RecordedRun
-from brrt.runs.run import made_by
+from brrt.scenario.manifest import made_by
 from brrt.scenario.scenario import Scenario
 
 TOLERANCE = 1e-9

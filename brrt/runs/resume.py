@@ -19,8 +19,8 @@ from brrt.planners.base.kernel_planner import Kernel, KernelPlanner, KernelRun
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.recording import Recording
-from brrt.runs.run import Run, Solver, made_by
-from brrt.scenario.manifest import Manifest
+from brrt.runs.run import Run, Solver
+from brrt.scenario.manifest import Manifest, made_by
 from brrt.scenario.scenario import UNLIMITED, Scenario
 
 

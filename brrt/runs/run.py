@@ -1,10 +1,7 @@
 """Run a scenario: plan, smooth, execute, and pass every event to the sinks."""
 
-import platform
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from functools import cache
-from importlib.metadata import version
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,7 +18,7 @@ from brrt.planners.postprocessing.shortcut import Shortcut
 from brrt.recording import Memory, Recording, Result, Sink
 from brrt.replay.metrics import Metrics
 from brrt.runs.switch_interval import short_switch_interval
-from brrt.scenario.manifest import Manifest
+from brrt.scenario.manifest import Manifest, made_by
 from brrt.scenario.scenario import Scenario
 from brrt.settings import Settings
 from brrt.worlds.world import World
@@ -207,14 +204,3 @@ def _close_all(sinks: list[Sink], result: Result | None) -> None:
             sinks[0].close(result)
         finally:
             _close_all(sinks[1:], result)
-
-
-@cache
-def made_by() -> dict[str, str]:
-    """Versions of brrt and of everything that affects its numbers, and the platform."""
-    names = {name: version(name) for name in ("brrt", "numpy", "numba", "llvmlite")}
-    return {
-        **names,
-        "python": platform.python_version(),
-        "platform": f"{platform.system()} {platform.machine()}",
-    }

@@ -2,8 +2,11 @@
 
 import hashlib
 import json
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cache
+from importlib.metadata import version
 from typing import Any, Self
 
 from brrt.errors import BrrtError
@@ -230,3 +233,14 @@ def _contract(values: Any) -> Contract | None:
         return Contract.from_dict(values)
     except BrrtError as error:
         raise BrrtError(f"the manifest is damaged: its contract: {error}") from None
+
+
+@cache
+def made_by() -> dict[str, str]:
+    """Versions of brrt and of everything that affects its numbers, and the platform."""
+    names = {name: version(name) for name in ("brrt", "numpy", "numba", "llvmlite")}
+    return {
+        **names,
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }

@@ -14,7 +14,8 @@ from brrt.errors import BrrtError
 from brrt.files import make_folder_of, parse_json, read_text, replacing
 from brrt.recording import Recording
 from brrt.replay.metrics import Metrics, metrics
-from brrt.runs.run import Run, made_by
+from brrt.runs.run import Run
+from brrt.scenario.manifest import made_by
 from brrt.scenario.scenario import Scenario
 
 SCHEMA, VERSION = "brrt.figures", 1

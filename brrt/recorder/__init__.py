@@ -1,0 +1,1 @@
+"""Record planners that are not brrt's own: `brrt.record`, and `brrt.log` for libraries."""

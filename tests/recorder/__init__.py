@@ -1,0 +1,1 @@
+"""Recording planners that are not brrt's own."""
