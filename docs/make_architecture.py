@@ -19,10 +19,11 @@ FOUNDATION |= {"worlds": (1.0, 1), "robots": (1.0, 2), "scenario": (1.0, 3), "re
 PLANNING = {"kernels": (0.0, 5), "planners": (0.0, 6), "runs": (0.4, 8)}
 READING = {"formats": (2.2, 5), "collision": (1.5, 5), "replay": (1.9, 6), "verification": (1.6, 7)}
 READING |= {"comparison": (2.3, 7), "explanation": (1.6, 8), "views": (2.3, 8)}
+READING |= {"recorder": (2.62, 6)}
 TOP = {"testing": (0.7, 9), "cli": (1.4, 10)}
 COLOURS = ((FOUNDATION, "#dfe7ef"), (PLANNING, "#f6e3cf"), (READING, "#dcefdc"), (TOP, "#eee6f3"))
 PLACES = FOUNDATION | PLANNING | READING | TOP
-WIDTH, HEIGHT, BOX, ROW, COLUMN = 930, 640, (190, 34), 54, 290
+WIDTH, HEIGHT, BOX, ROW, COLUMN = 1010, 640, (190, 34), 54, 290
 
 
 def package_of(module: str) -> str | None:
