@@ -73,7 +73,7 @@ def fault(error: BrokenError, count: int, last: Instant) -> str:
     """Describe what is wrong with a file, and which events come before that."""
     text = f"{error.fault}; {events_left(count, last.t / 1e9, complete=error.complete)}"
     cut = isinstance(error, CutError) and not error.complete
-    return f"{text}; the run did not finish" if cut else text
+    return f"{text}; the end of the run is missing" if cut else text
 
 
 def refusal(error: BrokenError, count: int, last: Instant) -> str:

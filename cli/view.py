@@ -152,6 +152,7 @@ def _draw(
 
     cursors = [Cursor(_TIMELINES[name], value) for name, value in limits.items()]
     cursor, file = cursors[0] if cursors else None, folder / f"{_stem(runs[0])}.rrd"
+    last = max((batch.last.iteration for run in recordings for batch in run.batches()), default=0)
     if len(runs) == 2:
         watch.update(0, "drawing both runs", "")
         difference = draw_pair(file, *recordings)
@@ -159,7 +160,8 @@ def _draw(
         print_line(f"{runs[0]} and {runs[1]} {result}")
         if cursor is None and difference is not None:
             cursor = Cursor("event", difference.seq)
-        return file, cursor
+        return file, cursor or Cursor("iteration", last)
+    cursor = cursor or Cursor("iteration", last)
     ring = limits.get("seq")
     if runs[0].suffix == ".rrd" and ring is None and recordings[0].result is not None:
         if file.stem == runs[0].stem:

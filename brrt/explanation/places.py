@@ -122,7 +122,7 @@ class Places:
 
     def _name(self, j: int) -> str:
         name = self._obstacles.name(j)
-        if j >= len(self._obstacles) or name.startswith("the"):
+        if j >= len(self._obstacles):
             return name
         digits = digits_within(self._world.lower, self._world.upper, PLACE_DIGITS)
         corners = (self._obstacles.lower[j], self._obstacles.upper[j])

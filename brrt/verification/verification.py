@@ -17,6 +17,11 @@ from brrt.verification.rules import RULES
 _WINDOW = 100_000
 """Events that rules judge together, at least."""
 
+_MADE_BY = {
+    "draws": Kind.SAMPLE, "growth": Kind.SAMPLE, "near": Kind.REWIRE, "lattice": Kind.EXPAND,
+}  # fmt: skip
+"""Parts of a contract, and events of planners that could promise them."""
+
 _PARTS = {Kind.SAMPLE: "samples", Kind.EDGE: "edges", Kind.EXPAND: "expanded cells"}
 """Kinds of events without which a planner's work cannot be judged."""
 
@@ -39,6 +44,18 @@ class Verification:
     events: int
     has_contract: bool
     is_cut: bool
+
+    def __str__(self) -> str:
+        judged = [result for result in self.results if result.examined]
+        broken = [result for result in judged if result.broken]
+        lines = [f"{each.rule}: broken {each.broken:,} times: {each.promise}" for each in broken]
+        lines += [f"  event {each.seq:,}: {each.message}" for each in self.findings]
+        lines += [
+            f"not judged, {why}: {', '.join(names)}" for why, names in self.not_judged.items()
+        ]
+        rest = sum(map(len, self.not_judged.values()))
+        count = f"{len(judged) - len(broken)} rules hold, {len(broken)} broken"
+        return "\n".join([*lines, f"{count}, {rest} could not be judged"])
 
     @property
     def holds(self) -> bool:
@@ -140,6 +157,11 @@ def _reason(rule: Rule) -> str | None:
         return f"the recording states no contract and planner {planner} is not registered"
     if rule.of_end and context.is_cut:
         return "the run's end is missing"
+    part = rule.needs
+    if part in _MADE_BY and not context.contract.planner.registered and not _applies(rule):
+        # A registered planner promises nothing of the kind; another one may have left it out.
+        made = _MADE_BY[part] in context.kept.kinds
+        return f"the contract states no {part}" if made else None
     if rule.kind not in _PARTS or rule.kind in context.kept.kinds or not _applies(rule):
         return None
     searches = context.contract.lattice is not None or Kind.EXPAND in context.kept.kinds

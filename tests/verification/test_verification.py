@@ -271,6 +271,17 @@ def test_verify_json(brrt: Callable[..., Result], tmp_path: Path) -> None:
         }  # fmt: skip
 
 
+def test_a_contract_that_leaves_out_a_part() -> None:
+    """What it leaves out is not judged, which is said; registered planners promise all they can."""
+    case = planned("rrt")
+    found = verify(case.recording(), contract=Contract(step=100.0, stops=True))
+    assert {"uniform draws", "goal draws"} <= set(found.not_judged["the contract states no draws"])
+    assert "steering" in found.not_judged["the contract states no growth"]
+    assert not any("near" in reason or "lattice" in reason for reason in found.not_judged)
+    assert "the contract states no draws" in str(found)
+    assert str(found).endswith("could not be judged")
+
+
 def test_verify_text(brrt: Callable[..., Result], tmp_path: Path) -> None:
     """A line for each rule, no wider than a terminal; --long prints whole promises."""
     run = written(planned("rrt"), tmp_path / "run.mcap")
