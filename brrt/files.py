@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
-from brrt.errors import BrrtError
+from brrt.errors import BrrtError, WriteError
 from brrt.output_names import TakenError, check_present, give_name, open_temporary
 from brrt.text import readable
 
@@ -185,6 +185,11 @@ def replacing(path: Path) -> Iterator[Path]:
         name = give_name(unfinished, path)
     except OSError as error:
         raise BrrtError(f"cannot write {path}: {error.strerror or error}") from None
+    except WriteError as error:
+        if str(unfinished) not in str(error):
+            raise
+        why = f"{error.reason}; nothing of it is left: name a file where there is more room"
+        raise WriteError(path, why) from None
     finally:
         if unfinished is not None:
             unfinished.unlink(missing_ok=True)
@@ -320,9 +325,11 @@ def _sync(number: int) -> None:
 
 def _sync_folder(folder: Path) -> None:
     """Sync the names in a folder to the disk, where folders can be opened for that."""
-    with suppress(OSError):
+    try:
         number = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(number)
-        finally:
-            os.close(number)
+    except (PermissionError, IsADirectoryError):
+        return
+    try:
+        _sync(number)
+    finally:
+        os.close(number)

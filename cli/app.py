@@ -132,6 +132,8 @@ def _run(args: Sequence[str] | None) -> int:
             for each in (error, error.__context__):  # where both files of a run have another name
                 if each is error or isinstance(each, TakenError):
                     complain(str(each))
+        elif isinstance(error, MemoryError):
+            complain("the memory does not suffice; free some, or use a smaller world or budget")
         else:
             print_exception(error)  # Python would end with code 1, which says "no path"
     return Code.BAD_INPUT

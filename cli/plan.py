@@ -306,7 +306,12 @@ def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> li
     if rrd is not None or view:
         from brrt.views.rerun.sink import RerunSink
 
-        sinks.append(BackgroundSink(RerunSink(run.manifest, world, path=rrd, view=view)))
+        try:
+            sinks.append(BackgroundSink(RerunSink(run.manifest, world, path=rrd, view=view)))
+        except BaseException:
+            for sink in sinks:
+                sink.close(None)
+            raise
     return sinks
 
 

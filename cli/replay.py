@@ -122,14 +122,16 @@ def _check_together(*, text_and_json: bool, lone_tree: bool, node_and_more: bool
 
 
 def _draw(recording: "Recording", limits: "Limits", rrd: Path) -> None:
+    from brrt.files import replacing
     from brrt.replay.fold import feed
     from brrt.views.rerun.sink import RerunSink
 
-    sink = RerunSink(recording.manifest, recording.world, path=rrd)
-    try:
-        feed(recording.batches(), [sink], limits)
-    finally:
-        sink.close(None if limits else recording.result)
+    with replacing(rrd) as unfinished:
+        sink = RerunSink(recording.manifest, recording.world, path=unfinished)
+        try:
+            feed(recording.batches(), [sink], limits)
+        finally:
+            sink.close(None if limits else recording.result)
 
 
 def _first_difference(recording: "Recording", golden: "Recording") -> "Difference | None":

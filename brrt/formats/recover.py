@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from brrt.errors import BrrtError, WriteError
+from brrt.errors import BrrtError
 from brrt.files import replacing
 from brrt.formats import read
 from brrt.formats.integrity import BrokenError
@@ -63,12 +63,8 @@ def recover(
         raise BrrtError(f"{whole}: is the recording itself; choose another name")
     recording = read(cut)
     with replacing(whole) as unfinished:
-        try:
-            sink = open_sink(unfinished, recording.manifest, recording.world)
-            return _rewrite(cut, recording, sink)
-        except WriteError as error:
-            why = f"{error.reason}; nothing of it is left: name a file where there is more room"
-            raise WriteError(whole, why) from None
+        sink = open_sink(unfinished, recording.manifest, recording.world)
+        return _rewrite(cut, recording, sink)
 
 
 def _rewrite(cut: Path, recording: Recording, sink: Any) -> Recovery:

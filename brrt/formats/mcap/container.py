@@ -49,8 +49,12 @@ class Container:
         self._file = OutputFile(path)
         self._waiting: list[bytes] = []
         self._written = 0
-        self._write(MAGIC)
-        self._record(records.Header("ros2", library))
+        try:
+            self._write(MAGIC)
+            self._record(records.Header("ros2", library))
+        except BaseException:
+            self._file.close()
+            raise
 
     @property
     def closed(self) -> bool:

@@ -56,12 +56,18 @@ class McapSink:
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
         try:
             self._file = Container(self._path, library)
+        except OSError as error:
+            raise WriteError(path, error.strerror or str(error)) from None
+        try:
             self._file.declare(*_declarations(definitions))
             self._file.metadata(RUN, with_checksum(manifest.to_strings()))
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
             self._file.flush()
         except OSError as error:
             raise WriteError(path, error.strerror or str(error)) from None
+        except BaseException:
+            self._file.close()
+            raise
 
     def write(self, events: Events) -> None:
         """Take a batch; small ones are joined into one chunk."""
@@ -99,12 +105,14 @@ class McapSink:
             yield
         except OSError as error:
             raise WriteError(self._path, error.strerror or str(error), LEFT) from None
+        except BaseException:  # no memory: what was flushed is whole, and nothing can follow it
+            self._file.close()
+            raise
 
     def _write_chunk(self, events: Events | None) -> None:
         if events is not None:
-            encoded = encode(events, self._layouts, self._epoch)
             with self._converting_errors():
-                self._file.chunk(*encoded)
+                self._file.chunk(*encode(events, self._layouts, self._epoch))
 
 
 def _declarations(definitions: Mapping[Kind, str]) -> Iterator[records.Schema | records.Channel]:

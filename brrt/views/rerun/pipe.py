@@ -78,6 +78,10 @@ class FilePipe:
         self._thread.join()
         self._check()
 
+    def discard(self) -> None:
+        """Write nothing more; `close` deletes a file that has no name yet."""
+        self._error = self._error or InterruptedError()
+
     def _copy(self) -> None:
         # The pipe is emptied even after an error: its writer would wait for ever.
         waiting = _poll(self._outlet)

@@ -1,11 +1,13 @@
 """Events into Rerun: exact columns to replay from, and a drawing beside them."""
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
 
+from brrt.errors import RecordingError
 from brrt.events import Events, Kind
 from brrt.formats.batching import Batching
 from brrt.formats.rrd.columns import (
@@ -77,7 +79,10 @@ class RerunSink:
             self._drawing = RunDrawing(self._rec, manifest, world)
             self._flush()
         except BaseException:
-            self._rec.disconnect()
+            if self._pipe is not None:
+                self._pipe.discard()
+            with suppress(RecordingError):
+                self._disconnect()
             raise
 
     def write(self, events: Events) -> None:
