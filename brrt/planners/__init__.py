@@ -69,8 +69,14 @@ def load_scenario(path: Path) -> Scenario:
         raise BrrtError(f"{path}: {error}") from None
 
 
-def state_contract(planner: Any, query: Query) -> Contract | None:
+def state_contract(planner: Any, query: Query, given: Planner | None = None) -> Contract | None:
     """Return a planner's contract, with its settings; None for an object that states none.
+
+    Args:
+        planner: The planner.
+        query: What it solves.
+        given: The planner with only the given settings, where the others are those of a
+            recording: what it leaves automatic counts as chosen.
 
     Raises:
         BrrtError: What the planner's method `contract` returns is not a contract.
@@ -84,6 +90,9 @@ def state_contract(planner: Any, query: Query) -> Contract | None:
     if not isinstance(planner, Planner):
         return contract
     settings, near = planner.as_dict(), contract.near
+    automatic = [] if given is None else [k for k, v in given.as_dict().items() if v is None]
+    recorded = {name: settings[name] for name in automatic if settings[name] is not None}
+    settings |= dict.fromkeys(automatic)
     lengths = {
         "step": contract.step,
         "gamma": None if near is None else near.gamma,
@@ -96,7 +105,8 @@ def state_contract(planner: Any, query: Query) -> Contract | None:
         first_path=planner.first_path,
         continuous=planner.continuous,
         settings=settings,
-        chosen={k: v for k, v in lengths.items() if v is not None and settings.get(k, 0) is None},
+        chosen=recorded
+        | {k: v for k, v in lengths.items() if v is not None and settings.get(k, 0) is None},
         greatest=planner.greatest_values(),
         fixed_params=planner.fixed_params,
     )

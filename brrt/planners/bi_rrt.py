@@ -46,7 +46,7 @@ class BiRRT(KernelPlanner):
 
     def contract(self, query: Query) -> Contract:
         """See `Planner.contract`."""
-        step = step_length(self.step, query)
+        step = self._step(query)
         growth = Growth(
             turn=self.turn,
             connects=self.grow == "connect",
@@ -58,17 +58,15 @@ class BiRRT(KernelPlanner):
 
     def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:
         """See `KernelPlanner.kernel`."""
-        step = step_length(self.step, problem)
+        step = self._step(problem)
         options = _bi_rrt.BiRRTOptions(
             step, self.grow == "connect", self.link == "connect", _TURNS[self.turn],
             self.always_link,
         )  # fmt: skip
         return make_kernel(options, problem, stop)
 
-
-def step_length(step: float | None, query: Query, part: float = 0.05) -> float:
-    """Return the given step, or by default a part of the world's longest side."""
-    return step or part * query.world.extent
+    def _step(self, query: Query) -> float:
+        return self.step or 0.05 * query.world.extent
 
 
 def make_kernel(

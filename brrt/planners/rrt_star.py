@@ -12,15 +12,24 @@ from brrt.planners import _rrt_star
 from brrt.planners.base.kernel_planner import Kernel, KernelPlanner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
-from brrt.planners.bi_rrt import step_length
 from brrt.scenario.contract import Contract, Draws, Growth, Near
 from brrt.scenario.query import Query
 from brrt.scenario.scenario import UNLIMITED
 from brrt.settings import param
+from brrt.worlds.mean_chord import mean_chord
 
-DEFAULT_STEP = 0.2
-"""Part of the world's longest side: four times RRT's, because the step also bounds the distance of
-parents, and a tree with few candidates improves slowly."""
+_PART = 0.2
+"""Default step in open worlds, as a part of the longest side: four times RRT's, because the step
+also bounds the distance of parents, and a tree with few candidates improves slowly."""
+
+_CHORDS = 2.0
+"""Default step in dense worlds, in mean chords of the free space: of longer motions hardly any is
+free. `benchmarks/star_step.py` compares it with the above."""
+
+
+def default_step(query: Query) -> float:
+    """Return the step of the star planners in a world."""
+    return min(_PART * query.world.extent, _CHORDS * mean_chord(query.world))
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +40,10 @@ class StarPlanner(KernelPlanner):
     resume_hint: ClassVar[str] = "let it improve the path: --param stop_at_first=false"
 
     step: float | None = param(
-        None, "longest edge; by default 20 % of the world's longest side", above=0
+        None,
+        "longest edge; by default 20 % of the world's longest side, and at most twice the mean "
+        "length of lines in free space",
+        above=0,
     )
     gamma: float | None = param(
         None,
@@ -70,7 +82,7 @@ class StarPlanner(KernelPlanner):
     def options(self, query: Query) -> _rrt_star.RRTStarOptions:
         """Return what the loop needs, with lengths resolved for a query."""
         return _rrt_star.RRTStarOptions(
-            step=step_length(self.step, query, DEFAULT_STEP),
+            step=self.step or default_step(query),
             goal_bias=0.0,
             gamma=self.gamma or proven_gamma(query),
             informed=self.informed,

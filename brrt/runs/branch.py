@@ -20,6 +20,7 @@ from brrt.runs.resume import (
     name_of,
     restored,
 )
+from brrt.scenario.contracts import as_planned
 from brrt.scenario.manifest import Branch, Manifest
 from brrt.scenario.scenario import Scenario
 
@@ -63,7 +64,10 @@ class BranchedRun(RecordedRun):
         iteration, ended = _branching_point(recording, until)
         before = recording.manifest.ruling(iteration)
         scenario = _changed(before, params or {}, seed, settings or {})
-        planner, parent = kernel_planner(scenario), kernel_planner(before.scenario)
+        then = as_planned(before, recording.world)[-1]
+        values = {k: v for k, v in scenario.params.items() if v is not None or k in (params or {})}
+        now = replace(scenario, params={**then.params, **values})
+        planner, parent = kernel_planner(now), kernel_planner(then)
         _check_fixed(parent, planner)
         # If only what follows planning changes, the last iteration of planning is made again.
         after = ended is not None and seed is None and _plans_alike(before.scenario, scenario)
@@ -91,7 +95,8 @@ class BranchedRun(RecordedRun):
             events=shared.count,
             scenario=before.scenario,
             seed=seed,
-            contract=before.contract or state_contract(parent, self.problem),
+            contract=before.contract
+            or state_contract(parent, self.problem, make_planner(before.scenario)),
         )
         # Times continue from the recorded ones, so time 0 lies that much earlier.
         epoch = self.manifest.epoch_ns - (0 if scenario.clock == "logical" else shared.t)

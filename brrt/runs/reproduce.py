@@ -12,6 +12,7 @@ from brrt.events import Events, Kind, Phase, Status
 from brrt.planners import PLANNERS, make_planner, make_stop
 from brrt.recording import Recording
 from brrt.runs.resume import BranchedPlan, RecordedRun
+from brrt.scenario.contracts import as_planned
 from brrt.scenario.manifest import made_by
 from brrt.scenario.scenario import Scenario
 
@@ -46,7 +47,8 @@ class ReproducedRun(RecordedRun):
         scenario = manifest.scenario
         if draws is not None:
             scenario = stopped_at(scenario, draws)
-        super().__init__(recording, manifest, scenario, make_planner(scenario), batch)
+        planner = make_planner(as_planned(manifest, recording.world)[-1])
+        super().__init__(recording, manifest, scenario, planner, batch)
         if manifest.branches:
             self._planner = BranchedPlan(replace(manifest, scenario=scenario))
             self.manifest = replace(self.manifest, branches=manifest.branches)

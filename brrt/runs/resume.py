@@ -14,12 +14,13 @@ from brrt.comparison.events import first_difference
 from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Phase, Status
 from brrt.kernels.event_log import EventLog
-from brrt.planners import PLANNERS, make_planner
+from brrt.planners import PLANNERS, make_planner, state_contract
 from brrt.planners.base.kernel_planner import Kernel, KernelPlanner, KernelRun
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.recording import Recording
 from brrt.runs.run import Run, Solver
+from brrt.scenario.contracts import as_planned
 from brrt.scenario.manifest import Manifest, made_by
 from brrt.scenario.scenario import UNLIMITED, Scenario
 
@@ -39,6 +40,8 @@ class RecordedRun(Run):
         batch: int,
     ) -> None:
         self._set_up(scenario, Problem.recorded(manifest, recording.world), planner, batch)
+        contract = state_contract(planner, self.problem, make_planner(scenario))
+        self.manifest = replace(self.manifest, contract=contract)
         # A branch may have changed the seed.
         self._rng = np.random.Generator(np.random.PCG64(manifest.stretches[0][1].seed))
 
@@ -133,7 +136,8 @@ def restored(
 def _started(
     manifest: Manifest, problem: Problem, rng: np.random.Generator, log: EventLog
 ) -> KernelRun:
-    return KernelRun(_replan_kernel(manifest.stretches[0][1], problem), problem, rng, log)
+    first = as_planned(manifest, problem.world)[0]
+    return KernelRun(_replan_kernel(first, problem), problem, rng, log)
 
 
 def _replan_kernel(scenario: Scenario, problem: Problem) -> Kernel[Any]:
@@ -144,7 +148,8 @@ def _replan(
     run: KernelRun, manifest: Manifest, problem: Problem, log: EventLog, iteration: int
 ) -> Iterator[Events]:
     """Plan to the end of an iteration, with the settings of each stretch of the manifest."""
-    for branch, (_, after) in zip(manifest.branches, manifest.stretches[1:], strict=True):
+    following = as_planned(manifest, problem.world)[1:]
+    for branch, after in zip(manifest.branches, following, strict=True):
         yield from run.advance(Stop(iterations=UNLIMITED, draws=branch.iteration))
         run.switch_settings(_replan_kernel(after, problem), branch.seed)
     yield from run.advance(Stop(iterations=UNLIMITED, draws=iteration))
@@ -192,8 +197,14 @@ class BranchedPlan:
     ) -> Iterator[Events]:
         """Yield all events."""
         *earlier, last = self.manifest.branches
-        before = replace(self.manifest, branches=tuple(earlier), scenario=last.scenario)
+        before = replace(
+            self.manifest,
+            branches=tuple(earlier),
+            scenario=last.scenario,
+            contract=last.contract,
+        )
         run = _started(before, problem, rng, log)
         yield from _replan(run, before, problem, log, last.iteration)
-        run.switch_settings(kernel_planner(self.manifest.scenario).kernel(problem, stop), last.seed)
+        planner = kernel_planner(as_planned(self.manifest, problem.world)[-1])
+        run.switch_settings(planner.kernel(problem, stop), last.seed)
         yield from run.finish(stop)

@@ -10,7 +10,7 @@ import importlib
 import math
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
 
@@ -20,6 +20,29 @@ from brrt.scenario.manifest import Manifest
 from brrt.scenario.query import Query
 from brrt.scenario.scenario import Scenario
 from brrt.worlds.world import World
+
+_FORMER_STEP: Mapping[str, float] = {"rrt-star": 0.2, "bi-rrt-star": 0.2}
+"""Default step, as a part of the world's longest side, of recordings that state no contract."""
+
+
+def as_planned(manifest: Manifest, world: World) -> tuple[Scenario, ...]:
+    """Return the scenario of each of a run's `stretches` with the settings that were in use.
+
+    A manifest keeps only the given parameters. The others are those of the contract, or, of a
+    recording that states none, the defaults of its time; today's may differ.
+    """
+    pairs = zip(manifest.stretches, manifest.contracts, strict=True)
+    return tuple(_as_planned(scenario, contract, world) for (_, scenario), contract in pairs)
+
+
+def _as_planned(scenario: Scenario, contract: Contract | None, world: World) -> Scenario:
+    used = {} if contract is None else {**contract.planner.settings, **contract.planner.chosen}
+    if contract is None and scenario.planner in _FORMER_STEP:
+        used["step"] = _FORMER_STEP[scenario.planner] * world.extent
+    if used.get("connect_distance") == used.get("step"):
+        used.pop("connect_distance", None)  # it follows the step, which a branch may change
+    used |= {name: value for name, value in scenario.params.items() if value is not None}
+    return replace(scenario, params=used)
 
 
 def contracts_of(manifest: Manifest, world: World) -> tuple[Contract | None, ...]:
@@ -42,18 +65,22 @@ def contract_of(manifest: Manifest, world: World) -> Contract:
 
 
 def registered_contracts(manifest: Manifest, world: World) -> tuple[Contract | None, ...]:
-    """Return what the registered planner states for each of a run's `stretches`.
+    """Return what the registered planner states for each of a run's `stretches`, as planned.
 
     None where no planner of that name is registered, or planners cannot be imported.
 
     Raises:
         BrrtError: The manifest's query is not free in the world, or a parameter is wrong.
     """
-    planners = [_registered(scenario) for _, scenario in manifest.stretches]
-    if None in planners:
-        return (None,) * len(planners)
+    given = [_registered(scenario) for _, scenario in manifest.stretches]
+    if None in given:
+        return (None,) * len(given)
     query = Query.recorded(manifest, world)
-    return tuple(_planners().state_contract(planner, query) for planner in planners)
+    used = [_registered(scenario) for scenario in as_planned(manifest, world)]
+    return tuple(
+        _planners().state_contract(planner, query, own)
+        for planner, own in zip(used, given, strict=True)
+    )
 
 
 def contract_differences(manifest: Manifest, world: World) -> list[str] | None:

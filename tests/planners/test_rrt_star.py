@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from brrt.kernels.jit import config
 from brrt.planners import Contract, make_planner
 from brrt.runs.run import Run
 from brrt.scenario.scenario import Scenario
+from brrt.worlds.mean_chord import mean_chord
+from brrt.worlds.occupancy import Grid
+from brrt.worlds.world import World
 from tests.planners.test_rrt import (
     FEW,
     ROUNDING,
@@ -332,3 +336,20 @@ def test_paths_come_close_to_the_optimum(
             assert late < 1.02
     for planner in TWINS:
         assert (medians[f"{planner}, informed"] < medians[planner]).all()
+
+
+def test_the_default_step_fits_the_world() -> None:
+    """20 % of the side where the world is open, two mean chords of free space where it is dense."""
+    cells = np.random.default_rng(0).random((200, 200)) < 0.15
+    cells[:3, :3] = cells[-3:, -3:] = False
+    worlds = {side: World.of_grid("grid", Grid(cells, np.zeros(2), side)) for side in (1.0, 1e-4)}
+    for side, world in worlds.items():
+        start, goal = (1.5 * side, 1.5 * side), (198.5 * side, 198.5 * side)
+        given = Scenario(planner="bi-rrt-star", start=start, goal=goal, smooth=False)
+        run = Run(replace(given, params={"stop_at_first": True}), world=world)
+        assert promise(run).step == pytest.approx(2 * mean_chord(world))
+        assert 10 < (promise(run).step or 0) / side < 15
+        assert run.execute().solved
+        assert not Run(replace(given, params={"step": 40 * side}), world=world).execute().solved
+    for open_world in ("circles2d", "empty3d", "rooms2d"):
+        assert promise(Run(Scenario(world=open_world, planner="rrt-star"))).step == 20

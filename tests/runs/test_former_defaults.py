@@ -1,0 +1,79 @@
+"""Recordings keep the settings that their planner had, whatever is the default today."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from brrt import Recording, Run, Scenario, reproduce, verify
+from brrt.planners import make_planner, state_contract
+from brrt.runs.branch import BranchedRun
+from brrt.scenario.contract import Contract
+from brrt.scenario.contracts import as_planned, changes_of, contract_differences, contract_of
+
+DENSE = Scenario(
+    world="circles2d:n=200,seed=1", planner="rrt-star", iterations=400, seed=3, smooth=False
+)
+STARS = ("rrt-star", "bi-rrt-star")
+
+
+def former(planner: str, *, stated: bool) -> Recording:
+    """Record with a step of 20 % of the world, which was the default; with its contract or none."""
+    run = Run(replace(DENSE, planner=planner, params={"step": 20.0}))
+    recording = run.record()
+    scenario = replace(run.manifest.scenario, params={})
+    contract = state_contract(make_planner(run.manifest.scenario), run.problem)
+    assert contract is not None
+    about = contract.planner
+    chosen = {"step": 20.0, **about.chosen}
+    settings = {**about.settings, "step": None}
+    contract = replace(contract, planner=replace(about, settings=settings, chosen=chosen))
+    manifest = replace(recording.manifest, scenario=scenario, contract=contract if stated else None)
+    return replace(recording, manifest=manifest)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("planner", STARS)
+def test_a_step_that_is_not_the_default_today(planner: str, *, stated: bool) -> None:
+    """Such a recording is planned again and judged by its own step."""
+    recording = former(planner, stated=stated)
+    today = Run(recording.manifest.scenario).manifest.contract or Contract()
+    assert today.step is not None
+    assert today.step < 15
+    assert reproduce(recording).equal
+    assert verify(recording).holds
+    assert contract_of(recording.manifest, recording.world).step == 20
+    about = contract_of(recording.manifest, recording.world).planner
+    assert (about.settings["step"], about.chosen["step"]) == (None, 20.0)
+    assert not contract_differences(recording.manifest, recording.world)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("planner", STARS)
+def test_its_branches(planner: str, *, stated: bool) -> None:
+    """They keep the step unless they change it, and links as long as the step follow it."""
+    recording = former(planner, stated=stated)
+    for params, step in (({"gamma": 30.0}, 20.0), ({"step": 7.0}, 7.0), ({}, 20.0)):
+        settings: dict[str, Any] = {"iterations": 600}
+        run = BranchedRun(recording, iteration=300, params=params, settings=settings)
+        branched = run.record()
+        contract = branched.manifest.contract or Contract()
+        assert contract.step == step
+        assert contract.link in (None, step)
+        assert "step" not in changes_of(branched.manifest)[0] or params == {"step": 7.0}
+        assert reproduce(branched).equal
+        assert verify(branched).holds
+        again = BranchedRun(branched, iteration=500, params={"informed": True}).record()
+        assert (again.manifest.contract or Contract()).step == step
+        assert reproduce(again).equal
+
+
+def test_given_settings_stay() -> None:
+    """What is given is used, None means automatic, and nothing is added to the manifest."""
+    recording = former("rrt-star", stated=True)
+    manifest, world = recording.manifest, recording.world
+    given = replace(manifest.scenario, params={"gamma": 12.0, "step": None})
+    (used,) = as_planned(replace(manifest, scenario=given), world)
+    assert (used.params["gamma"], used.params["step"]) == (12.0, 20.0)
+    assert used.params["goal_bias"] == 0.05
+    assert manifest.scenario.params == {}
