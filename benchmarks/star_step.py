@@ -26,8 +26,8 @@ GRIDS = (
     (512, 0.1),
 )  # fmt: skip
 GENERATED = (
-    "empty2d", "circles2d", "circles2d:n=200", "circles2d:n=400,size=200", "squares2d", "polygons2d",
-    "forest2d", "walls2d",
+    "empty2d", "circles2d", "circles2d:n=200", "circles2d:n=400,size=200", "squares2d",
+    "polygons2d", "forest2d", "walls2d",
     "passage2d", "bugtrap2d", "maze2d", "rooms2d", "spiral2d", "boxes3d",
     "boxes3d:n=400", "maze3d", "tower3d", "hurdles3d",
 )  # fmt: skip
