@@ -66,6 +66,7 @@ def view(
 ) -> None:
     """Show a recording, or two side by side with a ring where they first differ.
 
+    The run is shown at its end, unless an instant is given; drag the time slider.
     The window stays open when the command ends.
 
     Examples:

@@ -110,7 +110,9 @@ class Raster:
         """Whether a single obstacle contains each closed cell; shape `shape`.
 
         Obstacles are convex, so one that touches all corners of a slightly enlarged cell does.
+        Cells are not enlarged beyond the raster, where nothing moves: obstacles may end there.
         """
+        upper = self.lower + np.array(self.shape) * self.cell
         found = np.zeros(int(np.prod(self.shape)), np.bool_)
         corners = np.array(list(itertools.product((0, 1), repeat=len(self.shape))))
         for several in obstacles:
@@ -124,6 +126,7 @@ class Raster:
                     for corner in corners:
                         slack = (2 * corner - 1) * self.slack()
                         points = self.lower + (index + corner) * self.cell + slack
+                        points = np.clip(points, self.lower, upper)
                         left = np.flatnonzero(inside)
                         inside[left] = several.touch(which[part][owner][left], points[left])
                     found[cell[inside]] = True

@@ -2,6 +2,7 @@
 
 import heapq
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,6 +140,16 @@ def test_the_bound_is_near_to_the_width(gap: float, bound: float) -> None:
     assert world.start is not None
     assert world.goal is not None
     assert gap <= max_width(world, world.start, world.goal, 1 << 16, 8.0) <= bound
+
+
+@pytest.mark.parametrize("wall", [
+    {"boxes": np.array([[8.0, 0.0, 12.0, 20.0]])},
+    {"polygons": [np.array([[8.0, 0.0], [12.0, 0.0], [12.0, 20.0], [8.0, 20.0]])]},
+])  # fmt: skip
+def test_a_wall_that_ends_at_the_bounds_separates(wall: dict[str, Any]) -> None:
+    """Nothing passes between an obstacle and the bounds that it reaches."""
+    world = World("wall", np.zeros(2), np.full(2, 20.0), **wall)
+    assert max_width(world, np.array([2.0, 10.0]), np.array([18.0, 10.0]), 1 << 12, 5.0) == 0
 
 
 @settings(max_examples=30)
