@@ -42,7 +42,8 @@ class LogError(RecordingError):
 def unknown(what: str, name: str, known: Iterable[str]) -> BrrtError:
     """Return the error for a name that is not among the `known` names of a `what`."""
     names = sorted(known)
-    near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
+    begins = [each for each in names if name and each.startswith(name.lower())]
+    near = begins[:1] or get_close_matches(name.lower(), names, n=1, cutoff=0.5)
     if near:
         hint = f"did you mean {near[0]!r}?"
     else:

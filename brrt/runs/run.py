@@ -100,7 +100,7 @@ class Run:
         """Load or compile the kernels by an iteration or a part of one, before the clock starts."""
         problem, stop = self.problem, Stop(iterations=1, time_s=_REHEARSAL_S)
         rng, log = np.random.Generator(np.random.PCG64(0)), EventLog(problem.dof, 4096)
-        for _ in self._planner.solve(problem, rng, log, stop):
+        for _ in _solved(self._planner, problem, rng, log, stop):
             pass
         if self._smoother is not None:
             path = np.array([problem.start, problem.goal])
@@ -121,7 +121,7 @@ class Run:
             raise BrrtError("a run is made once; make another brrt.Run(scenario) to repeat it")
         self._ran = True
         path, moved, iteration, count = None, False, 0, 0
-        for batch in self._planner.solve(self.problem, self._rng, self._log, self.stop):
+        for batch in _solved(self._planner, self.problem, self._rng, self._log, self.stop):
             count += len(batch)
             if self._foreign:
                 check_possible(batch, count)
@@ -175,6 +175,24 @@ class Run:
         memory = Memory()
         self.execute([memory])
         return memory.recording(self.manifest, self.problem.world)
+
+
+def _solved(
+    planner: Solver, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
+) -> Iterable[Events]:
+    """Call a planner's `solve`.
+
+    Raises:
+        BrrtError: It is missing, or returns no batches.
+    """
+    solve: Any = getattr(planner, "solve", None)
+    batches = solve(problem, rng, log, stop) if callable(solve) else None
+    if not isinstance(batches, Iterable):
+        raise BrrtError(
+            f"planner {type(planner).__name__} needs a method solve that yields batches of events, "
+            "as by log.drain()"
+        )
+    return batches
 
 
 def _named(scenario: Scenario, planner: Solver) -> Scenario:

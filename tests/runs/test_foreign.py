@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,14 @@ def test_recordings_need_no_class(brrt: Callable[..., Result], files: list[Path]
         assert done.code == 0
         assert "no contract and planner their-own is not" in done.out
         assert brrt("verify", path, "--json").json["planner_known"] is False
+
+
+@pytest.mark.parametrize("solve", [None, lambda *_: None])
+def test_a_planner_without_batches(solve: Any) -> None:
+    """One line says what is missing."""
+    planner: Any = SimpleNamespace() if solve is None else SimpleNamespace(solve=solve)
+    with pytest.raises(BrrtError, match="needs a method solve that yields batches of events"):
+        Run(Scenario(planner="mine"), planner=planner)
 
 
 def test_verify(brrt: Callable[..., Result], tmp_path: Path) -> None:
