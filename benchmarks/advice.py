@@ -72,7 +72,7 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
                               "iterations": 500}, None),
     "a-star, few iterations": ({"world": "maze2d", "planner": "a-star", "iterations": 300}, None),
     "a-star, coarse cells": ({"world": "passage2d:gap=2", "planner": "a-star",
-                              "params": {"epsilon": 7}}, None),
+                              "params": {"epsilon": 7.5}}, None),
 }  # fmt: skip
 
 

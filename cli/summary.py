@@ -59,7 +59,10 @@ def _outcome(m: Mapping[str, Any]) -> str:
     if m["solved"]:
         return "solved" if m["status"] == "solved" else f"solved, ended by: {m['status']}"
     if m["status"] == "no path":
-        return "not solved, no path on the lattice; smaller cells may have one (--param epsilon=)"
+        return (
+            "not solved, no path on the lattice; smaller cells (--param epsilon=) or "
+            "a longer move to the goal (--param max_move=) may give one"
+        )
     return f"not solved, {m['status']}"
 
 

@@ -145,7 +145,8 @@ def slow_tree(f: Facts) -> Advice | None:
 
 _ANY: tuple[Rule, ...] = (unsolved.no_path, unsolved.body_too_wide)
 _UNSOLVED: tuple[Rule, ...] = (
-    *_ANY, unfinished, unsolved.large_cells, unsolved.goal_bias, short_step, unsolved.spreading,
+    *_ANY, unfinished, unsolved.short_move, unsolved.large_cells, unsolved.goal_bias, short_step,
+    unsolved.spreading,
     unsolved.unknown_clearance, unsolved.second_tree, unsolved.cramped, unsolved.long_step,
     lookahead, unsolved.all_cells, unsolved.longer,
 )  # fmt: skip
@@ -157,6 +158,7 @@ _SOLVED: tuple[Rule, ...] = (
 _EXCLUDES: Mapping[Rule, tuple[Rule, ...]] = {
     unsolved.no_path: _UNSOLVED,
     unsolved.body_too_wide: _UNSOLVED,
+    unsolved.short_move: (unsolved.large_cells, lookahead, unsolved.all_cells, unsolved.longer),
     unsolved.goal_bias: (unsolved.spreading, unsolved.longer),
     short_step: (unsolved.spreading, unsolved.second_tree, unsolved.longer),
     unsolved.spreading: (unsolved.unknown_clearance, unsolved.longer),

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from brrt import digits
 from brrt.explanation.clearance import at_least, at_most
 from brrt.explanation.commands import Advice, extend, file_of, replan, resume, rounded, show
 from brrt.explanation.diagnosis import (
@@ -56,6 +57,20 @@ def body_too_wide(f: Facts) -> Advice | None:
     return show(why, "plot", file_of(f), suffix=".png")
 
 
+def short_move(f: Facts) -> Advice | None:
+    """No cell is within a move of the goal, and from the nearest one a longer move is free."""
+    lattice, approach = f.contract.lattice, f.approach
+    if lattice is None or approach is None or approach.hit is not None:
+        return None
+    if approach.far * (1 - 1e-9) <= lattice.max_move or approach.far > 2 * lattice.epsilon:
+        return None
+    why = (
+        f"the goal is {approach.far:.3g} from the nearest cell that was reached, and the longest "
+        f"move to it is {lattice.max_move:g}"
+    )
+    return replan(f, why, params={"max_move": float(digits.at_least(approach.far, 3))})
+
+
 def large_cells(f: Facts) -> Advice | None:
     """The lattice has no path: its cells are too large for the passage."""
     lattice = f.contract.lattice
@@ -83,9 +98,12 @@ def _finer(f: Facts, why: str, epsilon: float) -> Advice:
     if cells > _ROOM and about.continuous is not None:
         why = f"{why}; there are {cells:.2g} cells of {epsilon:g}"
         return replan(f, why, planner=about.continuous)
+    params = {"epsilon": epsilon}
+    if f.contract.lattice is not None and f.contract.lattice.max_move < 2 * epsilon:
+        params["max_move"] = 2 * epsilon  # no point is farther from the nearest cell
     if cells > f.scenario.iteration_limit(about.default_iterations):
-        return replan(f, why, params={"epsilon": epsilon}, iterations=cells)
-    return replan(f, why, params={"epsilon": epsilon})
+        return replan(f, why, params=params, iterations=cells)
+    return replan(f, why, params=params)
 
 
 def _cells(f: Facts, epsilon: float) -> int:

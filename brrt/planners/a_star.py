@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from brrt.digits import at_least
 from brrt.errors import BrrtError
 from brrt.kernels.lattice import (
     MAX_CELLS,
@@ -23,6 +24,8 @@ from brrt.scenario import contract
 from brrt.scenario.query import Query
 from brrt.settings import param
 
+_ROUNDING = 1e-12
+
 _FIRST_ROOM = 1 << 18
 """Cells to allocate at first, where the bounds hold more."""
 
@@ -37,6 +40,20 @@ class LatticePlanner(KernelPlanner):
     epsilon: float = param(0.5, "edge of a cell", above=0)
     diagonals: bool = param(False, "move to all neighbours (26 in 3D), not only across faces")
     max_move: float = param(1.0, "longest straight move to the goal", low=0)
+
+    def check(self, query: Query) -> None:
+        """See `Planner.check`: the goal must be within a move of a cell."""
+        if not isinstance(query.robot, Point):
+            return
+        low, high = (query.lower - query.start, query.upper - query.start)
+        along = np.rint((query.goal - query.start) / self.epsilon)
+        along = np.clip(along, np.ceil(low / self.epsilon), np.floor(high / self.epsilon))
+        far = float(query.robot.distance(query.start + self.epsilon * along, query.goal))
+        if far * (1 - _ROUNDING) > self.max_move:
+            raise BrrtError(
+                f"max_move {self.max_move:g} is too small: the goal is {far:g} from the nearest "
+                f"cell; it must be at least {at_least(far)}, or choose another epsilon"
+            )
 
     def _lattice(self, problem: Problem) -> LatticeArrays:
         """Make a lattice that holds only the start.
@@ -53,7 +70,7 @@ class LatticePlanner(KernelPlanner):
         if self.epsilon < least:
             raise BrrtError(
                 f"epsilon {self.epsilon:g} is too small for this world; "
-                f"it must be at least {least:.2g}"
+                f"it must be at least {at_least(least, 2)}"
             )
         sides = (problem.world.upper - problem.world.lower) / self.epsilon + 1
         room = 32 + int(min(float(sides.prod()), _FIRST_ROOM))

@@ -11,6 +11,7 @@ from brrt.events import Events, Kind
 from brrt.formats.validate import check_possible
 from brrt.kernels.event_log import EventLog
 from brrt.planners import PLANNERS, check_params, make_planner, make_stop, state_contract
+from brrt.planners.base.planner import Planner
 from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.planners.postprocessing.execute import Execute
@@ -69,7 +70,10 @@ class Run:
             scenario = _named(scenario, planner)
             self._foreign = type(planner) not in PLANNERS.values()
         solver = make_planner(scenario) if planner is None else planner
-        self._set_up(scenario, Problem.of(scenario, world), solver, batch)
+        problem = Problem.of(scenario, world)
+        if isinstance(solver, Planner):
+            solver.check(problem)
+        self._set_up(scenario, problem, solver, batch)
 
     def _set_up(self, scenario: Scenario, problem: Problem, planner: Solver, batch: int) -> None:
         """Prepare everything that `events` needs."""

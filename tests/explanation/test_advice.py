@@ -4,11 +4,14 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brrt import (
+    World,
+    explain,
     read,
     snapshot,
 )
@@ -28,10 +31,11 @@ CASES: dict[str, tuple[list[str], str]] = {
     "bug trap": (["--world", "bugtrap2d", "--iterations", "2000", "--seed", "3"],
                  "--planner rrt-connect"),
     "few iterations": (FEW_ITERATIONS, "--from run.mcap --iterations 30000"),
-    "coarse cells": (["--world", "passage2d:gap=3", "--planner", "a-star", "--param", "epsilon=7"],
+    "coarse cells": (["--world", "passage2d:gap=3", "--planner", "a-star",
+                      "--param", "epsilon=7.5"],
                      "epsilon="),
     "much too coarse cells": (["--world", "passage2d:gap=0.2", "--planner", "a-star", "--param",
-                               "epsilon=7"], "--iterations"),
+                               "epsilon=7.5"], "--iterations"),
 }  # fmt: skip
 
 
@@ -177,3 +181,18 @@ def test_a_folded_command_is_the_command(values: list[str], flags: int) -> None:
     assert shlex.split("\n".join(lines).replace("\\\n", "")) == words
     assert all(len(line) <= 79 for line in lines)
     assert all(line.endswith(" \\") for line in lines[:-1])
+
+
+def test_cells_near_the_goal_are_blocked(tmp_path: Path, brrt: Command) -> None:
+    """The longer move that is advised leads to the goal from the nearest cell that was reached."""
+    near = [[x - 0.1, y - 0.1, x + 0.1, y + 0.1] for x in (5, 7) for y in (5, 7)]
+    world = tmp_path / "near.json"
+    World("near", np.zeros(2), np.full(2, 10.0), boxes=np.array(near)).save(world)
+    out = tmp_path / "run.mcap"
+    options = ["--planner", "a-star", "--start", "1,1", "--goal", "6,6", "--param", "epsilon=2",
+               "--param", "max_move=1.42", "--out", str(out)]  # fmt: skip
+    assert brrt("plan", "--world", str(world), *options).code == 1
+    advice = explain(read(out)).as_dict()["advice"][0]
+    assert "max_move=3.17" in advice["command"]
+    words = [word if word != "max_move=1.42" else "max_move=3.17" for word in options[:-2]]
+    assert brrt("plan", "--world", str(world), *words, "--no-record").code == 0

@@ -430,3 +430,20 @@ def test_kernels_run_as_plain_python_bit_for_bit() -> None:
         check=False,
     )
     assert done.stdout.strip() == digest(), done.stderr
+
+
+@pytest.mark.parametrize("planner", ["a-star", "lrta-star"])
+def test_a_goal_that_no_cell_is_near(planner: str) -> None:
+    """The least longest move is named before the search, and it is accepted."""
+    cases: list[tuple[str, float, tuple[float, ...], tuple[float, ...], str]] = [
+        ("empty3d", 2.0, (5, 5, 5), (10, 10, 10), "1.73206"),
+        ("empty2d", 2.0, (5, 5), (10, 10), "1.41422"),
+        ("empty2d", 60.0, (5, 5), (95, 95), "42.4265"),
+    ]
+    for world, epsilon, start, goal, least in cases:
+        params = {"epsilon": epsilon, "diagonals": True}
+        scenario = Scenario(world=world, planner=planner, params=params, start=start, goal=goal)
+        with pytest.raises(BrrtError, match=f"max_move 1 is too small: .* at least {least}, or"):
+            Run(scenario)
+        run = Run(replace(scenario, params=params | {"max_move": float(least)}, iterations=1000))
+        assert run.execute().solved

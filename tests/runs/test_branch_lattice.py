@@ -26,7 +26,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
     """Draw a search on a coarse lattice, so that it ends soon."""
     planner = draw(st.sampled_from(["a-star", "lrta-star"]))
     params: dict[str, Any] = {
-        "epsilon": draw(st.sampled_from([2.0, 3.3])),
+        "epsilon": draw(st.sampled_from([2.0, 3.6])),
         "diagonals": draw(st.booleans()),
         "max_move": draw(st.sampled_from([0.0, 5.0])),
     }
@@ -125,8 +125,8 @@ def test_refusals() -> None:
     shortest, _ = parent(replace(CAVE, planner="a-star"))
     with pytest.raises(BrrtError, match=r"ended with its path at .* \(--at-iteration\)$"):
         BranchedRun(shortest)
-    off_goal = {"epsilon": 33.0, "max_move": 0.0}
-    hopeless = replace(CAVE, world="circles2d:n=1", params=off_goal, goal=(99.0, 99.0))
+    coarse = {"epsilon": 7.5}
+    hopeless = replace(CAVE, world="passage2d:gap=3", params=coarse)
     recording, log = parent(hopeless)
     assert status(log) is Status.NO_PATH
     with pytest.raises(BrrtError, match="ended with the proof that there is no path at iteration"):

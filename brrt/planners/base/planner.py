@@ -56,6 +56,13 @@ class Planner(Settings):
             stop: Budget and interruption.
         """
 
+    def check(self, query: Query) -> None:
+        """Raise if these settings cannot solve a query, whatever its obstacles.
+
+        Raises:
+            BrrtError: They cannot.
+        """
+
     def contract(self, query: Query) -> Contract:  # noqa: ARG002
         """Return what this planner promises beyond what all planners do; see `Contract`."""
         return Contract()
