@@ -120,3 +120,25 @@ def test_an_error_reaches_the_planner(error: BaseException) -> None:
         run.execute([BackgroundSink(sink)])
     assert sink.closed
     assert len(sink.sizes) == 2
+
+
+def test_the_planner_waits_for_a_slow_sink() -> None:
+    """A batch waits a fraction of a second at most, however many the planner has."""
+    waited, born = list[float](), dict[int, float]()
+
+    class Sink:
+        def write(self, events: Events) -> None:
+            if len(events):
+                waited.append(time.monotonic() - born[int(events[Kind.SAMPLE]["seq"][0])])
+                time.sleep(0.05)
+
+        def close(self, result: Result | None) -> None:
+            assert result is not None
+
+    background = BackgroundSink(Sink())
+    for first in range(0, 60, 2):
+        born[first] = time.monotonic()
+        background.write(batch(first, 2))
+    background.close({})
+    assert len(waited) == 30
+    assert max(waited) < 1.0  # with a queue of 24 batches it is 1.2 s

@@ -28,15 +28,15 @@ LEFT = "what was written before is whole: replay it with --partial, or see brrt 
 """What there is of a file whose disk filled up."""
 
 _CHUNK_EVENTS = 8000
-_CHUNK_SECONDS = 0.5
-"""Half of what is promised: the rest is for the writing, on a machine that has more to do."""
+_CHUNK_SECONDS = 0.2
+"""Less than the half second that is promised: the rest is for the writing on a busy machine."""
 
 
 class McapSink:
     """Writes every event, in order, to an MCAP file that stock tools read.
 
     Manifest and world come first, so that a cut file keeps them; the result comes last. A chunk
-    is written at the latest by the first batch that comes half a second after its first event; in
+    is written at the latest by the first batch that comes 0.2 s after its first event; in
     a `BackgroundSink`, as `brrt plan` uses it, even if the planner emits nothing.
 
     Args:

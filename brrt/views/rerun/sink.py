@@ -29,7 +29,7 @@ from brrt.views.rerun.stream import connect, new_stream
 from brrt.views.viewer import process
 from brrt.worlds.world import World
 
-_BATCH, _FILE_S, _VIEW_S = 1 << 15, 0.5, 0.1
+_BATCH, _FILE_S, _VIEW_S = 1 << 14, 0.2, 0.1
 """Events that are written together, and seconds that one may wait for that, on its way to a file
 and to a viewer."""
 
