@@ -43,6 +43,11 @@ class Lattice(Settings):
         False, "ties go to the cell closer to the goal by its current estimate, then to the oldest"
     )
     trials: int = param(1, "runs from the start, each with what the ones before learned", low=1)
+    backs_up: bool = param(
+        True,
+        "with a lookahead of more than 1 the estimates of expanded cells become the least that the "
+        "cells around them allow, and the robot moves to the cell that would be expanded next",
+    )
 
 
 @dataclass(frozen=True, slots=True)

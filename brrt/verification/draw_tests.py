@@ -66,6 +66,37 @@ class FrequencyTest:
         return log_mean(self._logs), f"{words}; expected {self._expected:,.1f}"
 
 
+class ChanceTest:
+    """Tests how often an event occurs, and whether that depends on when it last did.
+
+    Args:
+        event: What the event is, in words.
+    """
+
+    def __init__(self, event: str) -> None:
+        when = ("", " right after the last", " soon after the last", " long after the last")
+        self._tests = [FrequencyTest(event + words) for words in when]
+        self._age = 1 << 40
+
+    def add(self, draws: Floats) -> None:
+        """See `FrequencyTest.add`."""
+        row = np.arange(len(draws))
+        last = np.maximum.accumulate(np.where(draws[:, 0] > 0, row, -1))
+        before = np.append(-1, last[:-1])[: len(row)]
+        age = np.where(before >= 0, row - before, self._age + row + 1)
+        soon = age * draws[:, 1] < 1
+        every = np.ones(len(row), bool)
+        for test, chosen in zip(self._tests, (every, age == 1, soon, ~soon), strict=True):
+            test.add(draws[chosen])
+        if len(row):
+            self._age = int(len(row) - 1 - last[-1] if last[-1] >= 0 else self._age + len(row))
+
+    def log_wealth(self) -> tuple[float, str]:
+        """See `EProcess.log_wealth`."""
+        found = [test.log_wealth() for test in self._tests]
+        return log_mean(np.array([log for log, _ in found])), max(found)[1]
+
+
 class UniformityTest:
     """Tests whether numbers are uniform in [0, 1) and independent of the number before.
 

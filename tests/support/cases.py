@@ -308,7 +308,7 @@ SEARCH = {
     "best first", "expansions", "shortest paths", "search exhausted", "neighbours", "choices",
     "limits", "estimates", "estimates admissible", "cells on lattice", "cell numbers",
     "goal reached", "iterations", "times", "lattice moves", "paths walked", "rejections",
-    "no duplicates", "paths free", "outcome", "lookahead",
+    "no duplicates", "paths free", "outcome", "lookahead", "learning", "frontier moves",
 }  # fmt: skip
 """The same for searches."""
 

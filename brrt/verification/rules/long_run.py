@@ -15,8 +15,8 @@ from brrt.robots import Point
 from brrt.scenario.contract import Contract
 from brrt.verification.context import Context
 from brrt.verification.draw_tests import (
+    ChanceTest,
     EvennessTest,
-    FrequencyTest,
     JointUniformityTest,
     RelationTest,
     UniformityTest,
@@ -76,7 +76,7 @@ class FrequencyRule(LongRunRule):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self.test = self.monitor(FrequencyTest(self.what))
+        self.test = self.monitor(ChanceTest(self.what))
 
     def judge_source(self, table: Table, source: Source, chance: float) -> None:
         """Test how many of the rows are from a source, each with a chance."""

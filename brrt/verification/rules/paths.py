@@ -199,6 +199,8 @@ class Shortcuts(Rule):
         context, i, j, after = self.context, int(event["i"]), int(event["j"]), float(event["cost"])
         if not 0 <= i < j < len(path):
             return f"waypoints {i} and {j} are not a pair of a path of {len(path)}", path
+        if j == i + 1:
+            return f"there is nothing between waypoints {i} and {j}", path
         if event["accepted"]:
             hit = int(context.first_hits(path[i][None], path[j][None])[0])
             if hit >= 0:

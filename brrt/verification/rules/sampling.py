@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import Events, Kind, Source
+from brrt.events import Events, Kind, Source, Stage
 from brrt.replay.text import vector
 from brrt.robots import Point
 from brrt.scenario.contract import Contract, Draws
@@ -98,6 +98,32 @@ class InformedSamples(Rule):
         )  # fmt: skip
 
 
+class InformedNodes(Rule):
+    name = "informed nodes"
+    promise = "Where samples are informed, no node joins through which no path can cost less."
+    needs = "near"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self.best = np.inf
+
+    def window(self, events: Events, contract: Contract) -> None:
+        context, edges, paths = self.context, events[Kind.EDGE], events[Kind.PATH]
+        paths = paths[paths["stage"] != Stage.SMOOTHED]
+        costs = np.append(self.best, paths["cost"])
+        best, self.best = costs[np.searchsorted(paths["seq"], edges["seq"])], float(costs[-1])
+        draws = contract.draws
+        if contract.near is None or contract.growth is None or not (draws and draws.informed):
+            return
+        edges, best = edges[np.isfinite(best)], best[np.isfinite(best)]
+        to_start = context.distance(context.start[None], edges["q"])
+        least = to_start + context.distance(edges["q"], context.goal[None])
+        self.judge(
+            edges, ~context.at_most(least, best),
+            lambda i: f"a path through it costs at least {least[i]:.9g}; the best, {best[i]:.9g}",
+        )  # fmt: skip
+
+
 class RepeatedDraws(Rule):
     """Judges the first million draws of a generator against each other, later ones against them."""
 
@@ -146,4 +172,4 @@ class RepeatedDraws(Rule):
             self.seen = known
 
 
-RULES = (Samples, Sources, InformedSamples, RepeatedDraws)
+RULES = (Samples, Sources, InformedSamples, InformedNodes, RepeatedDraws)

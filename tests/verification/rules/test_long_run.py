@@ -137,7 +137,17 @@ def stratified(side: int) -> Doctor:
     return doctor
 
 
+def every(period: int) -> Doctor:
+    """Draw the goal at regular intervals."""
+
+    def doctor(rng: np.random.Generator, q: np.ndarray, source: np.ndarray) -> None:
+        source[:] = np.arange(len(source)) % period == period - 1
+
+    return doctor
+
+
 LIES: list[tuple[str, int, Doctor]] = [
+    ("goal draws", 1000, every(20)),
     ("goal draws", 100_000, biased(0.07)),
     ("goal draws", 100_000, biased(0.03)),
     ("goal draws", 1000, biased(0.2)),

@@ -79,6 +79,8 @@ DOCTORED: list[Doctored] = [
      i=-4)), set()),
     ("shortcuts", "", on("rrt", lambda c: shifted(Kind.SHORTCUT, "cost", shortcut_row(c,
      accepted=False), 5.0)(c)), set()),
+    ("shortcuts", "nothing between", on("rrt", lambda c: c.edit(Kind.SHORTCUT, shortcut_row(c,
+     accepted=False), j=c.log[Kind.SHORTCUT]["i"][shortcut_row(c, accepted=False)] + 1)), set()),
     ("shortcuts", "is clear", on("rrt", refusing), {"rejections", "reasons", "smoothed"}),
     ("smoothed", "", on("rrt", lambda c: c.edit(Kind.SHORTCUT, shortcut_row(c, accepted=True),
      accepted=False)), {"shortcuts"}),

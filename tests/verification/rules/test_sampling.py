@@ -14,6 +14,7 @@ from tests.support.cases import (
     doctored,
     on,
     planned,
+    short,
 )
 from tests.verification.rules.test_long_run import informed, log_of, reused
 
@@ -36,6 +37,8 @@ DOCTORED: list[Doctored] = [
     ("sources", "", lambda: planned("rrt").judged_by(draws=Draws(goal_bias=0.0)), set()),
     ("informed samples", "", lambda: informed(lambda q: q * [1, 0] + [0, 1.0]),
      {"uniform informed draws", "steering"}),
+    ("informed nodes", "", lambda: short("informed").edit(Kind.EDGE, -1, q=[1.0, 99.0]),
+     {"steering", "edge costs", "edge lengths", "edges free"}),
     ("repeated draws", "was drawn before, by event", lambda: log_of(200, reused), set()),
 ]  # fmt: skip
 

@@ -271,47 +271,4 @@ class LatticeMoves(MoveRule):
         )  # fmt: skip
 
 
-class Lookahead(LatticeRule):
-    name = "lookahead"
-    promise = (
-        "Each search of LRTA* expands as many cells as the lookahead, fewer only if it reaches the "
-        "goal, and the robot then moves to a cell that it did not expand."
-    )
-
-    def judge_search(self, lattice: Lattice, table: Table) -> None:
-        context = self.context
-        lattices = [contract.lattice for _, contract in context.stretches]
-        limits = [each and each.lookahead for each in lattices]
-        begins = np.flatnonzero(table["parent"] < 0)
-        if not len(begins) or None in limits:
-            return
-        table, begins = table[begins[0] :], begins - begins[0]
-        stretch = context.stretch(table)[begins]
-        limit = np.array(limits, np.int64)[stretch]
-        count = np.diff(np.append(begins, len(table)))
-        seq = table["seq"][begins]
-        # Between two searches the robot moves; where it has arrived, the path is reported.
-        paths = context.events[Kind.PATH]["seq"]
-        arrived = np.diff(np.searchsorted(paths, np.append(seq, 1 << 62))) > 0
-        ended, again = arrived.copy(), np.diff(stretch, append=stretch[-1]) != 0
-        ended[-1] = True
-        first = table[begins]
-        self.judge(
-            first, (count > limit) | ((count < limit) & ~ended & ~again),
-            lambda i: f"the search expands {count[i]} cells; the lookahead is {limit[i]}",
-        )  # fmt: skip
-        search = np.repeat(np.arange(len(begins)), count) << 32
-        keys = np.sort(search | table["cell"])
-        wanted = (np.arange(len(begins) - 1) << 32) | first["cell"][1:]
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        inside = (keys[at] == wanted) & ~ended[:-1] & ~again[:-1]
-        self.judge(
-            first[1:], inside,
-            lambda i: f"a search from cell {first['cell'][i + 1]}, which the last one expanded",
-        )  # fmt: skip
-
-
-RULES = (
-    CellsOnLattice, CellNumbers, Expansions, Estimates, EstimatesAdmissible, LatticeMoves,
-    Lookahead,
-)  # fmt: skip
+RULES = (CellsOnLattice, CellNumbers, Expansions, Estimates, EstimatesAdmissible, LatticeMoves)

@@ -58,6 +58,10 @@ class _Learner:
         self._numbers: dict[Cell, int] = {}
         # The cell that was expanded last, and whether its estimate has been raised since.
         self._at: tuple[int, Cell] | None = None
+        # In which expansion each cell was seen first, and how many there were; None once a search
+        # of several cells has seen others.
+        self._seen: dict[Cell, int] | None = {tuple(np.zeros(len(context.start), int).tolist()): 0}
+        self._expansions = 0
         self._raised: Cell | None = None
         steps = product((-1, 0, 1), repeat=len(context.start))
         most = len(context.start) if lattice.diagonals else 1
@@ -79,10 +83,12 @@ class _Learner:
 
     def follow(self, kind: Kind, event: np.void, place: Cell, *, judged: bool) -> str | None:
         """Take an event; return what is wrong with it."""
+        self._seen = self._seen if judged else None
         if kind is Kind.REJECT:
             self._blocked.setdefault(int(event["node"]), set()).add(place)
         elif kind is Kind.EXPAND:
             cell = int(event["cell"])
+            self._expansions += 1
             self._at, self._raised, self._numbers[place] = (cell, place), None, cell
         elif kind is Kind.HEURISTIC:
             self._h[place], self._raised = float(event["h"]), place
@@ -117,6 +123,9 @@ class _Learner:
             for step in self._steps
             if (other := tuple(x + s for x, s in zip(place, step, strict=True))) not in blocked
         }
+        if self._seen is not None:
+            for other in costs:
+                self._seen.setdefault(other, self._expansions)
         best, chosen = min(costs.values(), default=np.inf), costs.get(target, np.inf)
         now, at_most = self._estimate(place), self._context.at_most
         if not at_most(np.asarray(min(best, 1e300)), now):
@@ -130,11 +139,14 @@ class _Learner:
     def _judge_tie(self, target: Cell, costs: dict[Cell, float]) -> str | None:
         """Return whether a cell of equal cost and estimate has priority over the target."""
         h, number = self._estimate(target), self._numbers.get(target, 0)
+        seen = self._seen or {}
         for other, cost in costs.items():
             if cost == costs[target] and other != target:
                 if self._estimate(other) < h:
                     return f"of equal cells, {list(other)} is closer to the goal"
-                if self._estimate(other) == h and self._numbers.get(other, number) < number:
+                older = self._numbers.get(other, number) < number
+                older |= seen.get(other, 0) < seen.get(target, 0)
+                if self._estimate(other) == h and older:
                     return f"of equal cells, {list(other)} was seen first"
         return None
 

@@ -56,13 +56,13 @@ class BestFirst(LatticeRule):
         )  # fmt: skip
 
 
-def _steps(lattice: Lattice, dim: int) -> list[Step]:
+def steps_of(lattice: Lattice, dim: int) -> list[Step]:
     """Return the steps from a cell to its neighbours."""
     steps = [step for step in product((-1, 0, 1), repeat=dim) if any(step)]
     return [step for step in steps if lattice.diagonals or sum(map(abs, step)) == 1]
 
 
-def _cell_keys(cells: Ints) -> Ints:
+def cell_keys(cells: Ints) -> Ints:
     """Return a number for each cell, by its integer coordinates, shape (n,)."""
     keys = np.zeros(len(cells), np.int64)
     for k in range(cells.shape[1]):
@@ -70,13 +70,13 @@ def _cell_keys(cells: Ints) -> Ints:
     return keys
 
 
-def _motion_keys(number: Ints, cell_keys: Ints) -> Keys:
+def motion_keys(number: Ints, cell_keys: Ints) -> Keys:
     """Return a number for each motion from a numbered cell to another cell, shape (n,)."""
     mixed = number.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     return (mixed ^ cell_keys.astype(np.uint64)) * np.uint64(0xC2B2AE3D27D4EB4F)
 
 
-def _contains(keys: Keys, wanted: Keys) -> Flags:
+def contains(keys: Keys, wanted: Keys) -> Flags:
     """Return which numbers are among sorted keys, shape (n,)."""
     if not len(keys):
         return np.zeros(len(wanted), bool)
@@ -94,11 +94,11 @@ class _Expanded:
 
     def __init__(self, context: Context, lattice: Lattice) -> None:
         table, rejects = context.events[Kind.EXPAND], context.events[Kind.REJECT]
-        keys = _cell_keys(indices(context, lattice, table["q"]))
+        keys = cell_keys(indices(context, lattice, table["q"]))
         self._keys, self.born = np.unique(keys, return_index=True)
         self.table = table[self.born]
-        targets = _cell_keys(indices(context, lattice, rejects["q"]))
-        self._blocked = np.unique(_motion_keys(rejects["node"].astype(np.int64), targets))
+        targets = cell_keys(indices(context, lattice, rejects["q"]))
+        self._blocked = np.unique(motion_keys(rejects["node"].astype(np.int64), targets))
 
     def neighbours(self, step: Step) -> tuple[Ints, Flags]:
         """Return for each cell the row of its neighbour or -1, and whether the motion is free."""
@@ -106,8 +106,8 @@ class _Expanded:
         other = np.minimum(np.searchsorted(self._keys, wanted), len(wanted) - 1)
         other = np.where(self._keys[other] == wanted, other, -1)
         numbers = self.table["cell"].astype(np.int64)
-        blocked = _contains(self._blocked, _motion_keys(numbers, wanted))
-        back = _contains(self._blocked, _motion_keys(numbers[other], self._keys))
+        blocked = contains(self._blocked, motion_keys(numbers, wanted))
+        back = contains(self._blocked, motion_keys(numbers[other], self._keys))
         return other, ~blocked & ((other < 0) | ~back)
 
     def in_order(self) -> Ints:
@@ -128,7 +128,7 @@ class ShortestPaths(LatticeRule):
         cells = _Expanded(self.context, lattice)
         cost = np.asarray(cells.table["cost"])
         least = np.full(len(cost), np.inf)
-        for step in _steps(lattice, self.context.dof):
+        for step in steps_of(lattice, self.context.dof):
             other, is_free = cells.neighbours(step)
             exists = is_free & (other >= 0) & (cells.born[other] < cells.born)
             through = cost[other] + lattice.epsilon * sum(map(abs, step)) ** 0.5
@@ -150,7 +150,7 @@ class SearchExhausted(LatticeRule):
             return
         cells = _Expanded(self.context, lattice)
         wrong = np.zeros(len(cells.table), bool)
-        for step in _steps(lattice, self.context.dof):
+        for step in steps_of(lattice, self.context.dof):
             other, is_free = cells.neighbours(step)
             wrong |= is_free & (other < 0)
         order = cells.in_order()
@@ -168,7 +168,7 @@ class CellNeighbours(LatticeRule):
     def judge_search(self, lattice: Lattice, table: Table) -> None:
         context, rejects = self.context, self.context.events[Kind.REJECT]
         cells, targets = (indices(context, lattice, some["q"]) for some in (table, rejects))
-        motions = _motion_keys(rejects["node"].astype(np.int64), _cell_keys(targets))
+        motions = motion_keys(rejects["node"].astype(np.int64), cell_keys(targets))
         again = np.ones(len(rejects), bool)
         again[np.unique(motions, return_index=True)[1]] = False
         last = np.searchsorted(table["seq"], rejects["seq"]) - 1
@@ -196,12 +196,12 @@ class CellNeighbours(LatticeRule):
         if not len(table):
             return
         table = table[np.linspace(0, len(table) - 1, min(MOST, len(table))).astype(np.int64)]
-        steps = np.array(_steps(lattice, context.dof))
+        steps = np.array(steps_of(lattice, context.dof))
         around = indices(context, lattice, table["q"])[:, None] + steps
         around = around.reshape(-1, context.dof)
         table = np.repeat(table, len(steps))
-        keys = _motion_keys(table["cell"].astype(np.int64), _cell_keys(around))
-        rest = ~_contains(blocked, keys)
+        keys = motion_keys(table["cell"].astype(np.int64), cell_keys(around))
+        rest = ~contains(blocked, keys)
         table, to = table[rest], context.start + lattice.epsilon * around[rest]
         low, high = context.lower - context.tolerance, context.upper + context.tolerance
         out = ~((low <= to) & (to <= high)).all(axis=1)
@@ -213,9 +213,13 @@ class CellNeighbours(LatticeRule):
 
 class GoalReached(LatticeRule):
     name = "goal reached"
-    promise = "If the goal is within a straight free move of a cell, the search ends there."
+    promise = (
+        "If the goal is within a straight free move of a cell, the search ends there, and no path "
+        "ends with a longer one."
+    )
 
     def judge_search(self, lattice: Lattice, table: Table) -> None:
+        self._judge_last_motions(lattice)
         context = self.context
         far = context.distance(table["q"], context.goal[None])
         near = np.flatnonzero(far < lattice.max_move * (1 - CLOSE) - context.tolerance)
@@ -236,6 +240,21 @@ class GoalReached(LatticeRule):
             cells, np.asarray(clear & (ends < 1 << 62) & (following > ends)),
             lambda i: f"cell {cells['cell'][i]} is {far[i]:.9g} from the goal; the search goes on",
         )  # fmt: skip
+
+    def _judge_last_motions(self, lattice: Lattice) -> None:
+        """Judge whether paths end with a move of the allowed length, or between neighbours."""
+        context = self.context
+        for event, path in context.planned_paths:
+            if len(path) == 1:
+                continue
+            last = path[-2:]
+            cells, far = indices(context, lattice, last), context.distance(last[:1], last[1:])
+            off = np.abs(context.start + lattice.epsilon * cells - last).max()
+            along = off <= CLOSE * lattice.epsilon + context.tolerance
+            along &= adjacent(lattice, cells[:1], cells[1:]).all()
+            right = along or context.at_most(far, lattice.max_move).all()
+            wrong = f"the motion to the goal is {far[0]:.9g} long, not {lattice.max_move:g} at most"
+            self.judge_one(event, None if right else wrong)
 
 
 RULES = (CellNeighbours, BestFirst, ShortestPaths, SearchExhausted, GoalReached)

@@ -12,7 +12,6 @@ from tests.support.cases import (
     altered,
     check_found,
     doctored,
-    first,
     moved,
     on,
     shifted,
@@ -46,20 +45,6 @@ def between_cells(case: Case) -> Case:
     return case.with_ball((table["q"][-1] + parent["q"]) / 2)
 
 
-def ahead(lookahead: int) -> Case:
-    """Judge a run with a lookahead of 12 by another one."""
-    return short("ahead").judged_by("lattice", lookahead=lookahead)
-
-
-def shorter_move(case: Case) -> Case:
-    """Search again a cell before the frontier."""
-    expands, moves = case.log[Kind.EXPAND], case.log[Kind.MOVE]
-    begins = expands["seq"][expands["parent"] < 0]
-    last = np.searchsorted(moves["seq"], begins[1]) - 1
-    row = first(expands, seq=int(begins[1]))
-    return case.edit(Kind.EXPAND, row, cell=moves["cell"][last - 1], q=moves["q"][last - 1])
-
-
 DOCTORED: list[Doctored] = [
     ("cells on lattice", "", on("walk", lambda c: c.edit(Kind.EXPAND, 3,
      q=c.log[Kind.EXPAND]["q"][3] + 0.1)), {"expansions"}),
@@ -82,10 +67,6 @@ DOCTORED: list[Doctored] = [
     ("estimates admissible", "", on("walk", too_high), {"choices"}),
     ("lattice moves", "", on("walk", lambda c: c.judged_by("lattice", epsilon=5.0)), {"choices",
      "neighbours"}),
-    ("lookahead", "the lookahead is 24", lambda: ahead(24), {"best first"}),
-    ("lookahead", "the lookahead is 6", lambda: ahead(6), {"best first"}),
-    ("lookahead", "which the last one expanded", lambda: shorter_move(short("ahead")), {*SEARCH,
-     "best first", "shortest paths"}),
 ]  # fmt: skip
 
 

@@ -74,6 +74,8 @@ DOCTORED: list[Doctored] = [
      "iterations"}),
     ("goal reached", "", lambda: longer_moves(short("a-star")), set()),
     ("goal reached", "", lambda: longer_moves(short("one trial")), set()),
+    ("goal reached", "the motion to the goal is", lambda: short("a-star").judged_by("lattice",
+     max_move=0.1), set()),
 ]  # fmt: skip
 
 
