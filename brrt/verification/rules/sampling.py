@@ -19,6 +19,9 @@ Flags = NDArray[np.bool_]
 _REMEMBERED = 1_000_000
 """Draws with which others are compared."""
 
+_SMALL = 1e-3
+"""Informed samples are compared if the best path is longer than this part of the bounds."""
+
 _KEYS = np.dtype([("key", "<u8"), ("first", "<f8"), ("seq", "<i8")])
 
 
@@ -143,8 +146,11 @@ class RepeatedDraws(Rule):
     def window(self, events: Events, contract: Contract) -> None:
         if contract.draws is None or not self.judges:
             return
-        table = events[Kind.SAMPLE]
-        table = table[np.isin(table["source"], (Source.UNIFORM, Source.INFORMED))]
+        drawn, wide = self.context.drawn, float((self.context.upper - self.context.lower).max())
+        source = drawn.table["source"]
+        # The ellipsoid of a goal at the start, or almost there, holds few numbers.
+        large = drawn.best > _SMALL * wide
+        table = drawn.table[(source == Source.UNIFORM) | ((source == Source.INFORMED) & large)]
         # Windows end where branches begin; a branch that draws from its own seed may draw again
         # what its parent has drawn.
         stream = int(np.searchsorted(self.firsts, table["seq"][:1], "right").sum())
