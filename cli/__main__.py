@@ -1,5 +1,5 @@
 """`python -m brrt_cli` is `brrt`."""
 
-from .app import main
+from .start import main
 
 main()

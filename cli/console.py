@@ -67,12 +67,12 @@ def _print_on_stderr(text: str, style: str) -> None:
 def announce_compilation() -> None:
     """Print a note if kernels are compiled, which takes seconds, and if they cannot be kept."""
     from brrt.kernels.cache import on_unsaved
-    from brrt.kernels.jit import CACHE_FOLDER, on_compiling
+    from brrt.kernels.jit import CACHE_FOLDER, WITHOUT_CACHE, on_compiling
 
     if CACHE_FOLDER is None:
         note(
-            "compiling the planner (10 to 20 s), again in each run: no folder for the cache is "
-            "writable; name one in the variable BRRT_CACHE_DIR"
+            "compiling the planner (10 to 20 s), again in each run: no folder for the cache "
+            f"({WITHOUT_CACHE}); name one in the variable BRRT_CACHE_DIR"
         )
         return
     text = "compiling the planner for this robot, once on this machine (10 to 20 s)"

@@ -1,6 +1,6 @@
 """`brrt plan`: run a planner and record it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +14,7 @@ from .progress import ProgressBar
 from .signals import stop_on_signals
 
 if TYPE_CHECKING:
-    from brrt.recording import Sink
+    from brrt.formats.background import BackgroundSink
     from brrt.replay.metrics import Metrics
     from brrt.runs.run import Run
 
@@ -296,27 +296,27 @@ def _branched_run(
     return run
 
 
-def _sinks(run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool) -> list["Sink"]:
+def _sinks(
+    run: "Run", mcap: Path | None, rrd: Path | None, *, view: bool
+) -> Iterator["BackgroundSink"]:
     from brrt.formats import McapSink
     from brrt.formats.background import BackgroundSink
 
-    world, sinks = run.problem.world, list["Sink"]()
+    world = run.problem.world
     if mcap is not None:
-        sinks.append(BackgroundSink(McapSink(mcap, run.manifest, world)))
+        yield BackgroundSink(McapSink(mcap, run.manifest, world), mcap)
     if rrd is not None or view:
         from brrt.views.rerun.sink import RerunSink
 
-        try:
-            sinks.append(BackgroundSink(RerunSink(run.manifest, world, path=rrd, view=view)))
-        except BaseException:
-            for sink in sinks:
-                sink.close(None)
-            raise
-    return sinks
+        yield BackgroundSink(RerunSink(run.manifest, world, path=rrd, view=view), rrd)
 
 
-def _execute(run: "Run", sinks: list["Sink"], bar: ProgressBar) -> "Metrics":
-    """Run until the end or a signal."""
+def _execute(run: "Run", sinks: Iterable["BackgroundSink"], bar: ProgressBar) -> "Metrics":
+    """Open the sinks, and run until the end or a signal."""
+    opened = list["BackgroundSink"]()
+
+    def unfinished() -> list[Path]:
+        return [sink.path for sink in opened if sink.path is not None and not sink.closed]
 
     def show(metrics: "Metrics") -> None:
         best = metrics.best_path
@@ -330,8 +330,14 @@ def _execute(run: "Run", sinks: list["Sink"], bar: ProgressBar) -> "Metrics":
     for line in run.problem.world.notes:
         note(line)
     bar.total = None if run.stop.time_s is not None else run.stop.iterations
-    with stop_on_signals(run.stop):
-        return run.execute(sinks, show)
+    with stop_on_signals(run.stop, unfinished):
+        try:
+            opened.extend(sinks)  # one by one, so that a signal meanwhile names what is open
+        except BaseException:
+            for sink in opened:
+                sink.close(None)
+            raise
+        return run.execute(opened, show)
 
 
 def _report(

@@ -4,6 +4,7 @@ import queue
 import threading
 import time
 from collections import deque
+from pathlib import Path
 
 from brrt.events import Events
 from brrt.recording import Result, Sink
@@ -25,10 +26,15 @@ class BackgroundSink:
 
     Args:
         sink: The sink that does the work.
+        path: Its file.
+
+    Attributes:
+        path: The file.
+        closed: Whether the sink is closed.
     """
 
-    def __init__(self, sink: Sink) -> None:
-        self._sink = sink
+    def __init__(self, sink: Sink, path: Path | None = None) -> None:
+        self._sink, self.path, self.closed = sink, path, False
         self._queue: queue.SimpleQueue[Events | None] = queue.SimpleQueue()
         self._pending = deque[float]()  # since when each batch waits
         self._progress = threading.Condition()
@@ -57,6 +63,7 @@ class BackgroundSink:
             self._sink.close(None)
             raise
         self._sink.close(result)
+        self.closed = True
 
     def _is_behind(self) -> bool:
         waits = self._pending

@@ -14,6 +14,7 @@ from numba.core import event
 from platformdirs import user_cache_path
 
 from brrt.kernels.cache import KernelCache
+from brrt.kernels.private_folder import fault_of_folder, make_private
 
 config: Any = _config
 
@@ -37,19 +38,24 @@ def _sources_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def _cache_folder() -> Path | None:
-    """Make the folder for compiled code; None if there is none."""
-    root = os.environ.get("BRRT_CACHE_DIR")
-    folder = Path(root) if root else user_cache_path("brrt", appauthor=False)
-    folder = folder / "kernels" / _sources_digest()
+def _cache_folder() -> tuple[Path | None, str]:
+    """Make the folder for compiled code; return it, or None and the reason why there is none."""
+    given = os.environ.get("BRRT_CACHE_DIR")
+    root = Path(given) if given else user_cache_path("brrt", appauthor=False)
+    folder = root
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    return folder
+        for folder in (root, root / "kernels", root / "kernels" / _sources_digest()):
+            make_private(folder)
+            fault = fault_of_folder(folder, shared=folder == root)
+            if fault is not None:
+                return None, f"{folder} is not used: {fault}"
+    except OSError as error:
+        return None, f"{folder}: {error.strerror or error}"
+    return folder, ""
 
 
-CACHE_FOLDER = _cache_folder()
+CACHE_FOLDER, WITHOUT_CACHE = _cache_folder()
+"""The folder for compiled code, and why there is none."""
 
 
 class _FirstCompilation(event.Listener):

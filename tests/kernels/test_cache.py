@@ -1,6 +1,9 @@
 """The cache of compiled kernels: whatever happens to its files, kernels compile and run."""
 
+import os
+import pickle
 import shutil
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -112,3 +115,98 @@ def test_code_of_another_kernel_is_not_loaded(folder: Path) -> None:
     code.write_bytes(other.read_bytes())
     assert hits(double) == 0
     assert hits(double) == 1
+
+
+class Bomb:
+    """Unpickling it makes a folder."""
+
+    def __init__(self, made: Path) -> None:
+        self._made = made
+
+    def __reduce__(self) -> Any:
+        return os.mkdir, (str(self._made),)
+
+
+def plant(file: Path, made: Path) -> None:
+    """Write a file of the cache that runs code, with a right checksum."""
+    data = pickle.dumps(Bomb(made))
+    file.write_bytes(data + zlib.crc32(data).to_bytes(4, "little"))
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["index", "code"])
+@pytest.mark.parametrize("place", ["file", "folder"])
+def test_what_others_may_write_to_is_not_unpickled(
+    folder: Path, tmp_path: Path, which: int, place: str
+) -> None:
+    """Neither a file nor a folder; the payload would run in the file of a private folder."""
+    file = files(folder)[which]
+    plant(file, tmp_path / "own")
+    hits(double)
+    assert (tmp_path / "own").exists()
+    plant(file, tmp_path / "boom")
+    (file if place == "file" else file.parent).chmod(0o777)
+    assert hits(double) == 0
+    assert not (tmp_path / "boom").exists()
+    assert hits(double) == (place == "file")  # a file is replaced, a folder stays unused
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["index", "code"])
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_links_and_pipes_are_replaced(folder: Path, tmp_path: Path, which: int, kind: str) -> None:
+    """A link is not followed, not even to a good file, and a pipe is not waited for."""
+    file = files(folder)[which]
+    file.rename(tmp_path / "good")
+    if kind == "link":
+        file.symlink_to(tmp_path / "good")
+    else:
+        os.mkfifo(file)
+    hits(double)
+    assert hits(double) == 1
+    assert file.is_file()
+    assert not file.is_symlink()
+
+
+def test_what_is_made_is_private(folder: Path) -> None:
+    """Whatever the umask is."""
+    modes = {path.stat().st_mode & 0o777 for path in [folder, *folder.rglob("*")]}
+    assert modes == {0o700, 0o600}
+
+
+def _to_pipe(root: Path) -> None:
+    shutil.rmtree(root)
+    os.mkfifo(root)
+
+
+FAULTS: dict[str, Callable[[Path], object]] = {
+    "writable": lambda root: root.chmod(0o777),
+    "writable inside": lambda root: (root / "kernels").chmod(0o720),
+    "a link": lambda root: root.symlink_to(root.rename(root.with_name("other"))),
+    "a pipe": _to_pipe,
+    "another's": lambda root: os.chown(root, 12345, -1),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_folders_that_are_not_used(
+    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The reason names the folder."""
+    if fault == "another's" and os.geteuid():
+        pytest.skip("only root gives files away")
+    root = tmp_path / "cache"
+    monkeypatch.setenv("BRRT_CACHE_DIR", str(root))
+    assert jit._cache_folder()[0] is not None
+    FAULTS[fault](root)
+    found, reason = jit._cache_folder()
+    assert found is None
+    assert reason.startswith(str(root))
+    assert "is not used" in reason
+
+
+def test_folder_in_a_shared_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in /tmp, where others cannot remove it."""
+    if os.geteuid():
+        pytest.skip("such a folder belongs to root")
+    tmp_path.chmod(0o1777)
+    monkeypatch.setenv("BRRT_CACHE_DIR", str(tmp_path))
+    assert jit._cache_folder()[0] is not None
