@@ -144,6 +144,8 @@ class Scenario:
         """
         try:
             values = tomllib.loads(read_text(path, "a scenario", _MAX_BYTES))
+        except RecursionError:
+            raise BrrtError(f"{path}: not a scenario: it is nested too deeply") from None
         except tomllib.TOMLDecodeError as error:
             raise BrrtError(f"{path}: not TOML: {error}") from None
         # Files of the world and the robot are relative to this file.

@@ -94,3 +94,12 @@ def test_bounds_without_a_declaration() -> None:
         PLANNERS["rrt"].parse("", {"step": 1e-151})
     with pytest.raises(BrrtError, match=r"trials must be at most 9,223,372,036,854,775,807, not"):
         PLANNERS["lrta-star"].parse("", {"trials": "18446744073709551616"})
+
+
+@pytest.mark.parametrize("value", ["[" * 20_000 + "]" * 20_000, "{a=" * 5000 + "1" + "}" * 5000])
+def test_nested_toml(value: str, tmp_path: Path) -> None:
+    """Python's parser recurses; that is said in one line."""
+    path = tmp_path / "deep.toml"
+    path.write_text(f"params = {value}\n")
+    with pytest.raises(BrrtError, match=r"deep\.toml: not a scenario: it is nested too deeply"):
+        Scenario.load(path)
