@@ -83,7 +83,7 @@ class Settings:
     def greatest_values(cls) -> dict[str, float]:
         """Return the greatest value of each setting that has one."""
         limits = {f.name: f.metadata["high"] for f in _params(cls)}
-        return {name: high for name, high in limits.items() if high is not None}
+        return {name: high for name, high in limits.items() if high not in (None, math.inf)}
 
     @classmethod
     def describe(cls) -> list[dict[str, str]]:
@@ -153,7 +153,7 @@ def _range_text(meta: Mapping[str, Any], hint: Any) -> str:
         parts.append(f">= {meta['low']:g}")
     if meta["above"] is not None:
         parts.append(f"> {meta['above']:g}")
-    if meta["high"] is not None:
+    if meta["high"] is not None and meta["high"] < math.inf:
         parts.append(f"<= {meta['high']:g}")
     return ", ".join(parts)
 

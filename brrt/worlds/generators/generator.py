@@ -1,5 +1,6 @@
 """Base classes of world generators: size, default start and goal, and connected worlds."""
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
@@ -183,7 +184,7 @@ class Seeded(Generator):
 
     draws: ClassVar[int] = 100
 
-    seed: int = param(0, "seed of the random draws", low=0)
+    seed: int = param(0, "seed of the random draws", low=0, high=math.inf)
 
     @abstractmethod
     def obstacles(self, rng: np.random.Generator) -> ObstacleSet:
