@@ -45,6 +45,7 @@ def status(log: Events) -> Status:
     return Status(int(log[Kind.PHASE]["status"][1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["rrt", "rrt-star", "lrta-star", "a-star"])
 def test_slow_planners_hand_over_what_they_have(
     planner: str, monkeypatch: pytest.MonkeyPatch
