@@ -128,9 +128,10 @@ class KernelRun:
                 kernel.state = kernel.enlarged(state)
             elif due is not None and (at_once or result == LIMIT):
                 return due
-            elif result == LIMIT and counts[DRAWS] >= draw_limit:
-                return Status.ITERATION_LIMIT
-            elif result != LIMIT and stop.events is not None and log.count >= stop.events:
+            elif result == LIMIT:
+                if counts[DRAWS] >= draw_limit:
+                    return Status.ITERATION_LIMIT
+            elif stop.events is not None and log.count >= stop.events:
                 return Status.ITERATION_LIMIT
         return None
 
