@@ -65,9 +65,12 @@ def contract_of(manifest: Manifest, world: World) -> Contract:
 
 
 def registered_contracts(manifest: Manifest, world: World) -> tuple[Contract | None, ...]:
-    """Return what the registered planner states for each of a run's `stretches`, as planned.
+    """Return what the registered planner states for each of a run's `stretches`.
 
-    None where no planner of that name is registered, or planners cannot be imported.
+    By its own defaults for a run that states a contract, so that another default shows; as planned
+    for one that states none, and for branches, which keep the settings of a run that another
+    version may have made. None where no planner of that name is registered, or planners cannot be
+    imported.
 
     Raises:
         BrrtError: The manifest's query is not free in the world, or a parameter is wrong.
@@ -76,7 +79,9 @@ def registered_contracts(manifest: Manifest, world: World) -> tuple[Contract | N
     if None in given:
         return (None,) * len(given)
     query = Query.recorded(manifest, world)
-    used = [_registered(scenario) for scenario in as_planned(manifest, world)]
+    used = given
+    if manifest.contract is None or manifest.branches:
+        used = [_registered(scenario) for scenario in as_planned(manifest, world)]
     return tuple(
         _planners().state_contract(planner, query, own)
         for planner, own in zip(used, given, strict=True)

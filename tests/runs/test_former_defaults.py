@@ -1,6 +1,7 @@
 """Recordings keep the settings that their planner had, whatever is the default today."""
 
 from dataclasses import replace
+from importlib.metadata import version
 from typing import Any
 
 import pytest
@@ -28,7 +29,12 @@ def former(planner: str, *, stated: bool) -> Recording:
     chosen = {"step": 20.0, **about.chosen}
     settings = {**about.settings, "step": None}
     contract = replace(contract, planner=replace(about, settings=settings, chosen=chosen))
-    manifest = replace(recording.manifest, scenario=scenario, contract=contract if stated else None)
+    manifest = replace(
+        recording.manifest,
+        scenario=scenario,
+        contract=contract if stated else None,
+        made_by={**recording.manifest.made_by, "brrt": "0.0.9"},
+    )
     return replace(recording, manifest=manifest)
 
 
@@ -45,7 +51,18 @@ def test_a_step_that_is_not_the_default_today(planner: str, *, stated: bool) -> 
     assert contract_of(recording.manifest, recording.world).step == 20
     about = contract_of(recording.manifest, recording.world).planner
     assert (about.settings["step"], about.chosen["step"]) == (None, 20.0)
-    assert not contract_differences(recording.manifest, recording.world)
+    differences = contract_differences(recording.manifest, recording.world) or []
+    assert any(each.startswith("step is 20.0") for each in differences) is stated
+
+
+@pytest.mark.parametrize("planner", STARS)
+def test_another_default_of_the_same_version(planner: str) -> None:
+    """Such a contract is not that of the registered planner, which verify finds."""
+    recording = former(planner, stated=True)
+    made_by = {**recording.manifest.made_by, "brrt": version("brrt")}
+    recording = replace(recording, manifest=replace(recording.manifest, made_by=made_by))
+    found = [each.message for each in verify(recording).findings if each.rule == "contract"]
+    assert any(message.startswith("step is 20.0 in the contract") for message in found)
 
 
 @pytest.mark.parametrize("stated", [True, False])
