@@ -19,7 +19,7 @@ _MODULES = {
     "Memory": "recording",
     "Recorder": "recorder.recorder",
     "log": "recorder.log",
-    "record": "recorder.recorder",
+    "record": "recorder.record",
     "Recording": "recording",
     "Sink": "recording",
     "Chain": "robots",

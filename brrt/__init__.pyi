@@ -15,8 +15,8 @@ from brrt.planners import RRT as RRT
 from brrt.planners import Planner as Planner
 from brrt.planners.base.problem import Problem as Problem
 from brrt.recorder.log import log as log
+from brrt.recorder.record import record as record
 from brrt.recorder.recorder import Recorder as Recorder
-from brrt.recorder.recorder import record as record
 from brrt.recording import Memory as Memory
 from brrt.recording import Recording as Recording
 from brrt.recording import Sink as Sink

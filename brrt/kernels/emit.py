@@ -1,16 +1,17 @@
 """The buffer of events that kernels write to, and one function `emit_<kind>` for each kind.
 
-The functions are generated from `events.FIELDS` when this module is imported, and each field of a
-kind gets its own place in the buffer, so a new kind needs no code here but its line at the end.
+The functions are generated from `event_columns.LAYOUT` when this module is imported, so a new kind
+needs no code here but its line at the end.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Field, Kind, Phase
+from brrt.event_columns import CONFIGURATIONS, INTEGERS, LAYOUT, REALS, WIDTH
+from brrt.events import Kind, Phase
 from brrt.kernels.clock import now_ns
 from brrt.kernels.jit import inline_helper
 
@@ -21,58 +22,6 @@ COUNT, FIRST_SEQ, LAST_T, ORIGIN, TICK, POINTS, UNTIL_T, UNTIL_SEQ, ASKED = rang
 
 _ASKED_PER_READING = 16
 """Calls of `paused` for each reading of the clock, on a logical clock."""
-
-INTEGERS, REALS, CONFIGURATIONS = "integers", "reals", "q"
-"""The columns of `Buffer` that hold fields."""
-
-_COLUMNS = {
-    **dict.fromkeys(("bool", "int8", "uint8", "int16", "uint16", "int32", "q[]"), INTEGERS),
-    **dict.fromkeys(("float32", "float64"), REALS),
-    "q": CONFIGURATIONS,
-}
-"""The column for each type of field; integers have 32 bits."""
-
-
-class Place(NamedTuple):
-    """Where the buffer holds a field.
-
-    Attributes:
-        field: The field.
-        column: Name of the column.
-        at: Index in the column's row, of a number or of a configuration. Waypoints take two
-            integers: their first row in `Buffer.points`, and the number of rows.
-    """
-
-    field: Field
-    column: str
-    at: int
-
-    @property
-    def end(self) -> int:
-        """Index after the field."""
-        return self.at + (2 if self.field.type == "q[]" else 1)
-
-
-def layout_of(kind: Kind, fields: tuple[Field, ...]) -> tuple[Place, ...]:
-    """Give each field of a kind its own place in the buffer.
-
-    Raises:
-        TypeError: The buffer cannot hold a field of that type.
-    """
-    places: list[Place] = []
-    for field in fields:
-        column = _COLUMNS.get(field.type)
-        if column is None:
-            raise TypeError(
-                f"field {field.name!r} of kind {kind.name} has the type {field.type!r}; "
-                f"brrt.kernels.emit can hold {', '.join(_COLUMNS)}"
-            )
-        taken = [place.end for place in places if place.column == column]
-        places.append(Place(field, column, max(taken, default=0)))
-    return tuple(places)
-
-
-LAYOUT: Mapping[Kind, tuple[Place, ...]] = {kind: layout_of(kind, FIELDS[kind]) for kind in Kind}
 
 
 class Buffer(NamedTuple):
@@ -103,16 +52,14 @@ class Buffer(NamedTuple):
 
 def empty_buffer(dof: int, capacity: int) -> Buffer:
     """Return a buffer for so many events."""
-    ends = [(place.column, place.end) for places in LAYOUT.values() for place in places]
-    width = {name: max(end for column, end in ends if column == name) for name, _ in ends}
     return Buffer(
         state=np.zeros(9, np.int64),
         kind=np.empty(capacity, np.uint8),
         t=np.empty(capacity, np.int64),
         iteration=np.empty(capacity, np.int64),
-        integers=np.empty((capacity, width[INTEGERS]), np.int32),
-        reals=np.empty((capacity, width[REALS])),
-        q=np.empty((capacity, width[CONFIGURATIONS] * dof)),
+        integers=np.empty((capacity, WIDTH[INTEGERS]), np.int32),
+        reals=np.empty((capacity, WIDTH[REALS])),
+        q=np.empty((capacity, WIDTH[CONFIGURATIONS] * dof)),
         points=np.empty((capacity, dof)),
     )
 

@@ -3,20 +3,19 @@
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
-from brrt.events import FIELDS, LATEST_NS, Events, Instant, Kind, LazyTables, Table, table_dtype
+from brrt.event_columns import LAYOUT, EventColumns
+from brrt.events import FIELDS, LATEST_NS, Events, Kind
 from brrt.kernels.arrays import enlarged
 from brrt.kernels.clock import COMPILED_CLOCK
 from brrt.kernels.emit import (
     COUNT,
     FIRST_SEQ,
     LAST_T,
-    LAYOUT,
     ORIGIN,
     POINTS,
     TICK,
@@ -192,42 +191,10 @@ class EventLog:
         old, n = self.buffer, len(self)
         first, points = int(old.state[FIRST_SEQ]), int(old.state[POINTS])
         rows = {name: getattr(old, name)[:n].copy() for name in _PER_EVENT}
-        columns = old._replace(points=old.points[:points].copy(), **rows)
         old.state[FIRST_SEQ] += n
         old.state[COUNT] = old.state[POINTS] = 0
-        counts = np.bincount(columns.kind, minlength=len(Kind))
-        present = {Kind(int(code)): int(counts[code]) for code in np.flatnonzero(counts)}
-        last = Instant(int(columns.t[-1]), int(columns.iteration[-1])) if n else Instant(0, 0)
-        batch = _Batch(first, self.dof, columns)
-        return Events(self.dof, LazyTables(present, last, batch.table))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Batch:
-    """A copy of the buffer's events, which kernels do not change any more."""
-
-    first: int
-    dof: int
-    columns: Buffer
-
-    def table(self, kind: Kind) -> Table:
-        """Gather the events of a kind, with their fields by name."""
-        columns, dof = self.columns, self.dof
-        rows = np.flatnonzero(columns.kind == kind)
-        table = np.empty(len(rows), table_dtype(kind, dof))
-        table["seq"] = rows + self.first
-        table["t"] = columns.t[rows]
-        table["iteration"] = columns.iteration[rows]
-        for field, column, at in LAYOUT[kind]:
-            if field.type == "q[]":
-                places = columns.integers[rows, at : at + 2].tolist()
-                for i, (begin, n) in enumerate(places):
-                    table[field.name][i] = columns.points[begin : begin + n]
-            elif field.type == "q":
-                table[field.name] = columns.q[rows, at * dof : (at + 1) * dof]
-            else:
-                table[field.name] = getattr(columns, column)[rows, at]
-        return table
+        columns = EventColumns(first, self.dof, points=old.points[:points].copy(), **rows)
+        return columns.events()
 
 
 def _invalid(

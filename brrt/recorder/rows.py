@@ -1,87 +1,151 @@
-"""Rows of events in the order in which they happen, as one `struct.pack_into` writes them."""
-
-from __future__ import annotations
+"""A batch of events as rows, each written by one `struct.pack_into`."""
 
 import struct
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.events import FIELDS, Events, Instant, Kind, LazyTables, Table, table_dtype
+from brrt.errors import BrrtError
+from brrt.event_columns import CONFIGURATIONS, INTEGERS, LAYOUT, REALS, WIDTH, EventColumns
+from brrt.events import Events, Kind
 
 Floats = NDArray[np.float64]
 
-_INTEGERS = 3
-"""Whole numbers in a row; waypoints take two of them, their first row and their number."""
+_MOST = 8192
+"""Events of a batch."""
+
+_PADDING = -(4 * WIDTH[INTEGERS] + 1) % 8
+
+_UNUSED = (0,) * WIDTH[INTEGERS]
 
 
-@cache
 def row_dtype(dof: int) -> np.dtype[np.void]:
-    """Return the layout of a row, with place for the fields of any kind."""
+    """Return the layout of a row."""
     return np.dtype(
         [
-            ("t", "<i8"), ("iteration", "<i8"), ("real", "<f8"), ("q", "<f8", (dof,)),
-            ("integers", "<i4", (_INTEGERS,)), ("kind", "u1"), ("rest", "V3"),
+            ("t", "<i8"), ("iteration", "<i8"), (REALS, "<f8", (WIDTH[REALS],)),
+            (CONFIGURATIONS, "<f8", (WIDTH[CONFIGURATIONS] * dof,)),
+            (INTEGERS, "<i4", (WIDTH[INTEGERS],)), ("kind", "u1"), ("padding", f"V{_PADDING}"),
         ]
     )  # fmt: skip
 
 
 def row_struct(dof: int) -> struct.Struct:
-    """Return what packs a row: time, iteration, float, configuration, integers, kind."""
-    return struct.Struct(f"<qqd{dof}d{_INTEGERS}iB3x")
+    """Return what packs a row with one float and one configuration, as all kinds have today."""
+    if WIDTH[REALS] > 1 or WIDTH[CONFIGURATIONS] > 1:
+        raise TypeError("a kind has two floats or configurations; brrt.recorder.rows packs one")
+    return struct.Struct(f"<qqd{dof}d{WIDTH[INTEGERS]}iB{_PADDING}x")
 
 
-def _places(kind: Kind) -> tuple[dict[str, int], str | None, str | None]:
-    """Return which integer holds each field of a kind, and its float and its configuration."""
-    integers: dict[str, int] = {}
-    end = 0
-    reals: list[str | None] = []
-    configurations: list[str | None] = []
-    for field in FIELDS[kind]:
-        if field.type == "q":
-            configurations.append(field.name)
-        elif field.type == "float64":
-            reals.append(field.name)
-        else:
-            integers[field.name], end = end, end + (2 if field.type == "q[]" else 1)
-    if end > _INTEGERS or len(reals) > 1 or len(configurations) > 1:
-        raise TypeError(f"kind {kind.name} has more fields than a row of brrt.recorder holds")
-    return integers, [*reals, None][0], [*configurations, None][0]
-
-
-PLACES: Mapping[Kind, tuple[dict[str, int], str | None, str | None]] = {k: _places(k) for k in Kind}
-
-
-def events_of(rows: Table, points: Floats, first: int, dof: int) -> Events:
-    """Return rows as a batch, whose tables are built by the thread that writes them.
+class Rows:
+    """The events that are recorded and not yet written.
 
     Args:
-        rows: The rows, shape (n,); they must not change any more.
-        points: Waypoints of their paths, shape (m, dof).
-        first: Number of the first event.
         dof: Numbers in a configuration.
+
+    Attributes:
+        last_t: Time of the last event in ns.
     """
 
-    def table(kind: Kind) -> Table:
-        chosen = np.flatnonzero(rows["kind"] == kind)
-        some, found = rows[chosen], np.empty(len(chosen), table_dtype(kind, dof))
-        integers, real, q = PLACES[kind]
-        found["seq"], found["t"], found["iteration"] = chosen + first, some["t"], some["iteration"]
-        for name, at in integers.items():
-            if found.dtype[name].hasobject:
-                for i, (begin, count) in enumerate(some["integers"][:, at : at + 2].tolist()):
-                    found[name][i] = points[begin : begin + count]
-            else:
-                found[name] = some["integers"][:, at]
-        if real is not None:
-            found[real] = some["real"]
-        if q is not None:
-            found[q] = some["q"]
-        return found
+    def __init__(self, dof: int) -> None:
+        packed = row_struct(dof)
+        self._dof, self._pack, self._size = dof, packed.pack_into, packed.size
+        self._nowhere = (0.0,) * dof
+        self._first, self.last_t = 0, -1
+        self._clear()
 
-    counts = np.bincount(rows["kind"], minlength=len(Kind))
-    present = {Kind(code): int(counts[code]) for code in np.flatnonzero(counts).tolist()}
-    last = Instant(int(rows["t"][-1]), int(rows["iteration"][-1]))
-    return Events(dof, LazyTables(present, last, table))
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for another event."""
+        return self._count == _MOST
+
+    def _clear(self) -> None:
+        self._bytes, self._count = bytearray(_MOST * self._size), 0
+        self._rows = np.frombuffer(self._bytes, row_dtype(self._dof))
+        self._points: list[Floats] = []
+        self._points_count = 0
+
+    def put(
+        self,
+        kind: Kind,
+        t: int,
+        iteration: int,
+        *integers: int,
+        real: float = 0.0,
+        q: Sequence[float] | None = None,
+    ) -> None:
+        """Append an event, for which there must be room.
+
+        Args:
+            kind: What happened.
+            t: Time in ns; an event is at least 1 ns after the one before.
+            iteration: The planner's count.
+            integers: The kind's whole numbers in the order of `events.FIELDS`.
+            real: The kind's float.
+            q: The kind's configuration, shape (dof,).
+
+        Raises:
+            BrrtError: A number has the wrong type, or is too large.
+        """
+        t = max(t, self.last_t + 1)
+        try:
+            self._pack(
+                self._bytes, self._count * self._size, t, iteration, real,
+                *(self._nowhere if q is None else q),
+                *integers, *_UNUSED[len(integers) :], kind,
+            )  # fmt: skip
+        except (struct.error, TypeError) as error:
+            raise BrrtError(f"a {kind.label} event cannot be recorded: {error}") from None
+        self.last_t = t
+        self._count += 1
+
+    def put_path(self, t: int, iteration: int, stage: int, cost: float, waypoints: Floats) -> None:
+        """Append a path, whose waypoints stay in the batch of its event."""
+        self.put(Kind.PATH, t, iteration, stage, self._points_count, len(waypoints), real=cost)
+        self._points.append(waypoints)
+        self._points_count += len(waypoints)
+
+    def put_many(
+        self, kind: Kind, t: int, iteration: Any, fields: Mapping[str, Any], part: slice
+    ) -> int:
+        """Append as many events of one kind as there is room for; return how many.
+
+        Args:
+            kind: What happened.
+            t: Time of the first one in ns; the others follow 1 ns apart.
+            iteration: Of each, shape (n,), or one for all.
+            fields: Each field, shape (n,) or (n, dof), or one value for all.
+            part: Which of the n to append.
+        """
+        count: int = min(part.stop - part.start, _MOST - self._count)
+        part = slice(part.start, part.start + count)
+        rows = self._rows[self._count : self._count + count]
+        first = max(t, self.last_t + 1)
+        rows["t"] = np.arange(first, first + count)
+        rows["iteration"] = iteration[part] if np.ndim(iteration) else iteration
+        rows["kind"] = kind
+        for field, column, at in LAYOUT[kind]:
+            values = fields[field.name]
+            if field.type == "q":
+                rows[column][:, at * self._dof : (at + 1) * self._dof] = values[part]
+            else:
+                rows[column][:, at] = values[part] if np.ndim(values) else values
+        self.last_t, self._count = first + count - 1, self._count + count
+        return count
+
+    def take(self) -> Events:
+        """Return the events as a batch, and begin another one."""
+        rows, first = self._rows[: self._count], self._first
+        points = np.concatenate([np.empty((0, self._dof)), *self._points])
+        columns = EventColumns(
+            first, self._dof, rows["kind"], rows["t"], rows["iteration"], rows[INTEGERS],
+            rows[REALS], rows[CONFIGURATIONS], points,
+        )  # fmt: skip
+        self._first += len(rows)
+        self._clear()
+        return columns.events()

@@ -9,6 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from brrt import event_columns
 from brrt.events import COUNTS, FIELDS, Field, Kind, table_dtype
 from brrt.kernels import emit, event_log
 from brrt.kernels.jit import config, kernel
@@ -88,7 +89,7 @@ def wide(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[ModuleType, ModuleTy
     monkeypatch.setitem(FIELDS, Kind.CONNECT, WIDE)
     table_dtype.cache_clear()
     modules = []
-    for module in (emit, event_log):
+    for module in (event_columns, emit, event_log):
         spec = importlib.util.spec_from_file_location(module.__name__, module.__file__)
         assert spec is not None
         assert spec.loader is not None
@@ -96,7 +97,7 @@ def wide(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[ModuleType, ModuleTy
         monkeypatch.setitem(sys.modules, module.__name__, again)
         spec.loader.exec_module(again)
         modules.append(again)
-    yield modules[0], modules[1]
+    yield modules[1], modules[2]
     table_dtype.cache_clear()
 
 
@@ -113,7 +114,7 @@ def test_a_field_that_does_not_fit_is_refused(kind_of: str) -> None:
     """By its name and its kind's, when the module is imported."""
     fields = (*FIELDS[Kind.EDGE], Field("weight", kind_of, "too large"))
     with pytest.raises(TypeError, match=f"field 'weight' of kind EDGE has the type '{kind_of}'"):
-        emit.layout_of(Kind.EDGE, fields)
+        event_columns.layout_of(Kind.EDGE, fields)
 
 
 @pytest.mark.parametrize("kind", Kind)

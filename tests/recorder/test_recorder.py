@@ -14,9 +14,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import brrt
-from brrt import BrrtError, Kind, Recorder, World, forest, read, record, verify
+from brrt import (
+    BrrtError,
+    Kind,
+    Memory,
+    Recorder,
+    Scenario,
+    World,
+    forest,
+    read,
+    record,
+    verify,
+)
 from brrt.events import Events, Status
-from brrt.recorder.rows import PLACES, row_dtype, row_struct
+from brrt.recorder.rows import row_dtype, row_struct
+from brrt.scenario.query import Query
 
 WORLD = World(
     "open",
@@ -142,34 +154,59 @@ def test_a_clock_of_the_caller(tmp_path: Path) -> None:
     assert log[Kind.SAMPLE]["iteration"].tolist() == [7]
 
 
-WRONG: list[tuple[str, Any, str]] = [
-    ("edge", ([1.0, 2.0, 3.0],), "q must be 2 numbers, not 3"),
-    ("edge", ([1.0, float("nan")],), "q must be finite"),
-    ("edge", ("here",), "q must be 2 numbers"),
-    ("edge", ([1.0, None],), "q must be 2 numbers"),
-    ("edge", ([2.0, 2.0], 5), "parent must be a node of tree 0, not 5"),
-    ("sample", ([2.0, 2.0], "nowhere"), "there is no|unknown source"),
-    ("reject", ([2.0, 2.0], 0.5), "reject event cannot be recorded"),
-    ("rewire", (0, 9), "parent must be a node"),
-    ("path", ([[1.0, 1.0, 1.0]],), "waypoints must be rows of 2 numbers"),
-    ("samples", (np.zeros(3),), r"q must have the shape \(n, 2\)"),
-    ("samples", (np.full((3, 2), np.inf),), "q must be finite"),
-    ("edges", (np.ones((2, 2)), [0, 5]), "a node of tree 0 before it"),
-    ("tree", (np.ones((2, 2)), [1, 0]), "lead to no root"),
+WRONG: list[tuple[str, tuple[Any, ...], dict[str, Any], str]] = [
+    ("edge", ([1.0, 2.0, 3.0],), {}, "q must be 2 finite numbers, not .1.0, 2.0, 3.0"),
+    ("edge", ([1.0, float("nan")],), {}, "q must be 2 finite numbers"),
+    ("edge", ([1e200, -1e200],), {}, "q must be 2 finite numbers"),
+    ("edge", ("ab",), {}, "q must be 2 finite numbers, not 'ab'"),
+    ("edge", (7,), {}, "q must be 2 finite numbers, not 7"),
+    ("edge", ([1.0, None],), {}, "q must be 2 finite numbers"),
+    ("edge", ([2.0, 2.0], 5), {}, "parent must be a node of tree 0, not 5"),
+    ("edge", ([2.0, 2.0], 0.0), {}, "parent must be a node of tree 0, not 0.0"),
+    ("edge", ([2.0, 2.0], 0), {"node": 7}, "node of tree 0 must be 1, its next, not 7"),
+    ("edge", ([2.0, 2.0], 0), {"cost": "1"}, "cost must be a finite number, not '1'"),
+    ("edge", ([2.0, 2.0], 0), {"cost": float("inf")}, "cost must be a finite number"),
+    ("edge", ([2.0, 2.0],), {"tree": 2}, "tree must be 0 or 1, not 2"),
+    ("sample", ([2.0, 2.0], "nowhere"), {}, "unknown source 'nowhere'"),
+    ("sample", ([2.0, 2.0], 99), {}, "unknown source '99'"),
+    ("sample", ([2.0, 2.0],), {"tree": -1}, "tree must be 0 or 1"),
+    ("reject", ([2.0, 2.0], 0.5), {}, "node must be a node of tree 0 or an expanded cell, not 0.5"),
+    ("reject", ([2.0, 2.0], 1), {}, "node must be a node of tree 0"),
+    ("reject", ([2.0, 2.0], 0, 77), {}, "unknown reason '77'"),
+    ("rewire", (0, 9), {}, "parent must be a node of tree 0, not 9"),
+    ("rewire", (0, 0), {}, "parent of node 0 must not descend from it"),
+    ("connect", (0, 0), {}, "other must be a node of tree 1, not 0"),
+    ("path", ([[1.0, 1.0, 1.0]],), {}, r"waypoints must have the shape \(n, 2\), not \(1, 3\)"),
+    ("path", ([[1.0, float("nan")]],), {}, "waypoints must be finite"),
+    ("path", (np.empty((0, 2)),), {}, "waypoints must be one configuration at least"),
+    ("path", ([[1.0], [1.0, 2.0]],), {}, "waypoints must be rows of 2 numbers"),
+    ("expand", (-1, 0, [1.0, 1.0], 0.0), {}, "cell must be the number of a cell, not -1"),
+    ("samples", (np.zeros(3),), {}, r"q must have the shape \(n, 2\)"),
+    ("samples", (np.full((3, 2), np.inf),), {}, "q must be finite"),
+    ("samples", (np.ones((2, 2)), [0, 99]), {}, r"source must be numbers of 0 \(uniform\)"),
+    ("edges", (np.ones((2, 2)), [0, 5]), {}, "parent must be for each row a node of tree 0 before"),
+    ("edges", (np.ones((2, 2)), [0.5, 0.5]), {}, "parent must be for each row a node"),
+    ("edges", (np.ones((2, 2)), [0, 0]), {"cost": [1.0, np.nan]}, "cost must be finite"),
+    ("edges", (np.ones((2, 2)), [0, 0]), {"cost": [1.0] * 3}, "cost must be 2 numbers"),
+    ("rejects", (np.ones((2, 2)), 0, [0, 77]), {}, r"reason must be numbers of 0 \(collision\)"),
+    ("rejects", (np.ones((2, 2)), [0, 9]), {}, "node must be nodes of tree 0"),
+    ("tree", (np.ones((2, 2)), [1, 0]), {}, "lead to no root"),
+    ("close", ("perhaps",), {}, "unknown status 'perhaps'"),
 ]
 
 
-@pytest.mark.parametrize(("method", "given", "message"), WRONG)
+@pytest.mark.parametrize(("method", "given", "named", "message"), WRONG)
 def test_wrong_values_are_errors_at_the_call(
-    method: str, given: Any, message: str, tmp_path: Path
+    method: str, given: tuple[Any, ...], named: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
     """The rest of the recording is kept."""
     with record(tmp_path / "x.mcap", world=WORLD) as rec:
         rec.edge([1, 1])
         with pytest.raises(BrrtError, match=message):
-            getattr(rec, method)(*given)
+            getattr(rec, method)(*given, **named)
     _, log = ended(tmp_path / "x.mcap")
-    assert len(log[Kind.EDGE]) == 1
+    assert log.counts == {Kind.PHASE: 2, Kind.EDGE: 1}
+    assert log.last.iteration == 0
 
 
 def test_an_exception_ends_the_run(tmp_path: Path) -> None:
@@ -184,6 +221,55 @@ def test_an_exception_ends_the_run(tmp_path: Path) -> None:
     with pytest.raises(BrrtError, match="is closed"):
         rec.sample([1, 1])
     rec.close()
+
+
+def test_a_sink_that_fails() -> None:
+    """The error is raised at the next call, also where only the flush in the background met it."""
+
+    class Full(Memory):
+        def write(self, events: Events) -> None:
+            raise BrrtError("no space left")
+
+    for wait in (0.6, 0.0):
+        sink = Full()
+        rec = Recorder(sink, Query.of(Scenario(), WORLD))
+        threading.Event().wait(wait)
+        with pytest.raises(BrrtError, match="no space left"):
+            rec.close()
+        rec.close()
+        assert sink.result is None
+        with pytest.raises(BrrtError, match="is closed"):
+            rec.sample([2, 2])
+    rec = Recorder(Full(), Query.of(Scenario(), WORLD))
+    threading.Event().wait(0.6)
+    with pytest.raises(BrrtError, match="no space left"):
+        rec.sample([2, 2])
+    with pytest.raises(BrrtError, match="no space left"), rec:
+        rec.edge([1, 1])
+
+
+def test_searches(tmp_path: Path) -> None:
+    """Cells that are expanded, and what was rejected from them."""
+    with record(tmp_path / "x.mcap", world=WORLD) as rec:
+        rec.expand(0, -1, [1, 1], 0.0)
+        rec.reject([1, 2], 0)
+        rec.expand(5, 0, [2, 1], 1.0)
+        rec.reject([2, 2], 5, "collision")
+    log = read(tmp_path / "x.mcap").events()
+    assert log[Kind.EXPAND]["cell"].tolist() == [0, 5]
+    assert log[Kind.REJECT]["node"].tolist() == [0, 5]
+
+
+def test_a_tree_that_turns_around(tmp_path: Path) -> None:
+    """A child becomes the parent of its parent; what closes a circle is refused."""
+    q = [[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]]
+    with record(tmp_path / "x.mcap", world=WORLD) as rec:
+        rec.tree(q, [-1, 0, 1])
+        rec.tree(q, [-1, 2, 0])
+        with pytest.raises(BrrtError, match="a circle, or a root"):
+            rec.tree(q, [-1, 2, 1])
+    tree = forest(read(tmp_path / "x.mcap").events())[0]
+    assert tree.parent.tolist() == [-1, 2, 0]
 
 
 def test_threads(tmp_path: Path) -> None:
@@ -275,9 +361,8 @@ def test_a_killed_process_keeps_what_it_recorded(tmp_path: Path) -> None:
     assert verify(recording).findings == []
 
 
-def test_rows_hold_every_kind() -> None:
-    """Each field of a kind has its own place."""
-    assert set(PLACES) == set(Kind)
+def test_rows_are_packed_as_they_are_laid_out() -> None:
+    """For any number of coordinates."""
     for dof in (1, 2, 7):
         assert row_struct(dof).size == row_dtype(dof).itemsize
 
