@@ -14,7 +14,7 @@ from brrt.errors import BrrtError
 from brrt.events import Kind, Phase, Reason, Source, Stage, Status
 from brrt.recorder import log
 from brrt.recorder.nodes import Nodes, from_root
-from brrt.recorder.rows import Rows
+from brrt.recorder.rows import ROOM, Rows
 from brrt.recorder.values import (
     choice,
     chosen,
@@ -62,7 +62,7 @@ class Recorder:
         self._error: BaseException | None = None
         self._origin = 0 if clock else time.perf_counter_ns()
         self._clock = clock or time.perf_counter_ns
-        self._put(Kind.PHASE, Phase.PLAN, Status.BEGIN)
+        self._put(Kind.PHASE, 0.0, None, Phase.PLAN, Status.BEGIN)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._flush_late, name="brrt flush", daemon=True)
         self._thread.start()
@@ -89,9 +89,9 @@ class Recorder:
         values, origin = configuration(q, self._dof), choice("source", Source, source)
         with self._lock:
             self._nodes(tree)
-            self._check_open()
+            self._make_room()
             self._iteration += self._counts_samples
-            self._put(Kind.SAMPLE, tree, origin, q=values)
+            self._put(Kind.SAMPLE, 0.0, values, tree, origin)
 
     def edge(
         self,
@@ -114,7 +114,7 @@ class Recorder:
         values = configuration(q, self._dof)
         with self._lock:
             nodes = self._nodes(tree)
-            number = len(nodes)
+            number = len(nodes.parent)
             up = -1 if parent is None else self._node("parent", parent, tree, low=-1)
             if node is not None and node != number:
                 raise BrrtError(f"node of tree {tree} must be {number}, its next, not {node!r:.60}")
@@ -122,7 +122,7 @@ class Recorder:
                 total = cost_of(cost)
             else:
                 total = 0.0 if up < 0 else nodes.cost[up] + self._far(nodes.place(up), values)
-            self._put(Kind.EDGE, tree, number, up, real=total, q=values)
+            self._put(Kind.EDGE, total, values, tree, number, up)
             nodes.join(values, up, total)
             return number
 
@@ -139,7 +139,7 @@ class Recorder:
         with self._lock:
             most = max(len(self._nodes(tree)), self._cells, 1)
             at = whole("node", node, 0, most, f"a node of tree {tree} or an expanded cell")
-            self._put(Kind.REJECT, tree, at, why, q=values)
+            self._put(Kind.REJECT, 0.0, values, tree, at, why)
 
     def rewire(self, node: int, parent: int, *, cost: float | None = None, tree: int = 0) -> None:
         """Record that a node got another parent; the costs of its descendants follow.
@@ -159,7 +159,7 @@ class Recorder:
                 total = cost_of(cost)
             else:
                 total = nodes.cost[up] + self._far(nodes.place(up), nodes.place(at))
-            self._put(Kind.REWIRE, tree, at, up, real=total)
+            self._put(Kind.REWIRE, total, None, tree, at, up)
             nodes.move(at, up, total)
 
     def connect(self, node: int, other: int, *, cost: float | None = None) -> None:
@@ -176,7 +176,7 @@ class Recorder:
                 total = cost_of(cost)
             else:
                 total = a.cost[i] + self._far(a.place(i), b.place(j)) + b.cost[j]
-            self._put(Kind.CONNECT, i, j, real=total)
+            self._put(Kind.CONNECT, total, None, i, j)
 
     def path(
         self, waypoints: ArrayLike, *, cost: float | None = None, stage: Stage | str | None = None
@@ -215,7 +215,7 @@ class Recorder:
         at = whole("cell", cell, 0, _MOST, "the number of a cell")
         up = whole("parent", parent, -1, _MOST, "the number of a cell, or -1")
         with self._lock:
-            self._put(Kind.EXPAND, at, up, real=total, q=values)
+            self._put(Kind.EXPAND, total, values, at, up)
             self._cells = max(self._cells, at + 1)
 
     def samples(self, q: ArrayLike, source: Any = Source.UNIFORM, *, tree: int = 0) -> None:
@@ -329,7 +329,7 @@ class Recorder:
             if self._closed:
                 return
             try:
-                self._put(Kind.PHASE, Phase.PLAN, ended)
+                self._put(Kind.PHASE, 0.0, None, Phase.PLAN, ended)
                 self._flush()
             except BaseException as error:  # noqa: BLE001 - raised below, once all is closed
                 self._error = error
@@ -355,10 +355,15 @@ class Recorder:
         self.close(None if kind is None else Status.INTERRUPTED)
 
     def _nodes(self, tree: int) -> Nodes:
+        if type(tree) is int and 0 <= tree < 2:
+            return self._trees[tree]
         return self._trees[whole("tree", tree, 0, 2, "0 or 1")]
 
     def _node(self, name: str, node: Any, tree: int, low: int = 0) -> int:
-        return whole(name, node, low, len(self._nodes(tree)), f"a node of tree {tree}")
+        count = len(self._nodes(tree).parent)
+        if type(node) is int and low <= node < count:  # the usual case, without a message
+            return node
+        return whole(name, node, low, count, f"a node of tree {tree}")
 
     def _far(self, a: Sequence[float], b: Sequence[float]) -> float:
         """Return the distance in the robot's metric."""
@@ -388,15 +393,14 @@ class Recorder:
 
     def _make_room(self) -> None:
         self._check_open()
-        if self._rows.full:
+        if self._rows.count == ROOM:
             self._flush()
 
-    def _put(
-        self, kind: Kind, *integers: int, real: float = 0.0, q: Sequence[float] | None = None
-    ) -> None:
+    def _put(self, kind: Kind, real: float, q: Sequence[float] | None, *integers: int) -> None:
         """Record an event; see `Rows.put`."""
         self._make_room()
-        self._rows.put(kind, self._now(), self._iteration, *integers, real=real, q=q)
+        t = self._clock() - self._origin
+        self._rows.put(kind, t, self._iteration, real, q, *integers)
 
     def _put_many(self, kind: Kind, count: int, fields: dict[str, Any], iteration: Any) -> None:
         """Record events of one kind; see `Rows.put_many`."""
@@ -407,7 +411,7 @@ class Recorder:
             done += self._rows.put_many(kind, self._now(), iteration, fields, part)
 
     def _flush(self) -> None:
-        if len(self._rows):
+        if self._rows.count:
             self._sink.write(self._rows.take())
 
     def _flush_late(self) -> None:

@@ -13,12 +13,10 @@ from brrt.events import Events, Kind
 
 Floats = NDArray[np.float64]
 
-_MOST = 8192
+ROOM = 8192
 """Events of a batch."""
 
 _PADDING = -(4 * WIDTH[INTEGERS] + 1) % 8
-
-_UNUSED = (0,) * WIDTH[INTEGERS]
 
 
 def row_dtype(dof: int) -> np.dtype[np.void]:
@@ -33,10 +31,10 @@ def row_dtype(dof: int) -> np.dtype[np.void]:
 
 
 def row_struct(dof: int) -> struct.Struct:
-    """Return what packs a row with one float and one configuration, as all kinds have today."""
-    if WIDTH[REALS] > 1 or WIDTH[CONFIGURATIONS] > 1:
-        raise TypeError("a kind has two floats or configurations; brrt.recorder.rows packs one")
-    return struct.Struct(f"<qqd{dof}d{WIDTH[INTEGERS]}iB{_PADDING}x")
+    """Return what packs a row: time, iteration, a float, a configuration, three integers, kind."""
+    if (WIDTH[INTEGERS], WIDTH[REALS], WIDTH[CONFIGURATIONS]) != (3, 1, 1):
+        raise TypeError("a kind has more fields than Rows.put takes")
+    return struct.Struct(f"<qqd{dof}d3iB{_PADDING}x")
 
 
 class Rows:
@@ -46,6 +44,7 @@ class Rows:
         dof: Numbers in a configuration.
 
     Attributes:
+        count: How many there are, `ROOM` at most.
         last_t: Time of the last event in ns.
     """
 
@@ -56,16 +55,8 @@ class Rows:
         self._first, self.last_t = 0, -1
         self._clear()
 
-    def __len__(self) -> int:
-        return self._count
-
-    @property
-    def full(self) -> bool:
-        """Whether there is no room for another event."""
-        return self._count == _MOST
-
     def _clear(self) -> None:
-        self._bytes, self._count = bytearray(_MOST * self._size), 0
+        self._bytes, self.count = bytearray(ROOM * self._size), 0
         self._rows = np.frombuffer(self._bytes, row_dtype(self._dof))
         self._points: list[Floats] = []
         self._points_count = 0
@@ -75,9 +66,11 @@ class Rows:
         kind: Kind,
         t: int,
         iteration: int,
-        *integers: int,
-        real: float = 0.0,
-        q: Sequence[float] | None = None,
+        real: float,
+        q: Sequence[float] | None,
+        first: int = 0,
+        second: int = 0,
+        third: int = 0,
     ) -> None:
         """Append an event, for which there must be room.
 
@@ -85,28 +78,31 @@ class Rows:
             kind: What happened.
             t: Time in ns; an event is at least 1 ns after the one before.
             iteration: The planner's count.
-            integers: The kind's whole numbers in the order of `events.FIELDS`.
-            real: The kind's float.
-            q: The kind's configuration, shape (dof,).
+            real: The kind's float, 0 without one.
+            q: The kind's configuration, shape (dof,); None without one.
+            first: The first of the kind's whole numbers, in the order of `events.FIELDS`.
+            second: The second of them.
+            third: The third.
 
         Raises:
             BrrtError: A number has the wrong type, or is too large.
         """
-        t = max(t, self.last_t + 1)
+        if t <= self.last_t:
+            t = self.last_t + 1
         try:
             self._pack(
-                self._bytes, self._count * self._size, t, iteration, real,
-                *(self._nowhere if q is None else q),
-                *integers, *_UNUSED[len(integers) :], kind,
+                self._bytes, self.count * self._size, t, iteration, real,
+                *(self._nowhere if q is None else q), first, second, third, kind,
             )  # fmt: skip
         except (struct.error, TypeError) as error:
             raise BrrtError(f"a {kind.label} event cannot be recorded: {error}") from None
         self.last_t = t
-        self._count += 1
+        self.count += 1
 
     def put_path(self, t: int, iteration: int, stage: int, cost: float, waypoints: Floats) -> None:
         """Append a path, whose waypoints stay in the batch of its event."""
-        self.put(Kind.PATH, t, iteration, stage, self._points_count, len(waypoints), real=cost)
+        first = self._points_count
+        self.put(Kind.PATH, t, iteration, cost, None, stage, first, len(waypoints))
         self._points.append(waypoints)
         self._points_count += len(waypoints)
 
@@ -122,9 +118,9 @@ class Rows:
             fields: Each field, shape (n,) or (n, dof), or one value for all.
             part: Which of the n to append.
         """
-        count: int = min(part.stop - part.start, _MOST - self._count)
+        count: int = min(part.stop - part.start, ROOM - self.count)
         part = slice(part.start, part.start + count)
-        rows = self._rows[self._count : self._count + count]
+        rows = self._rows[self.count : self.count + count]
         first = max(t, self.last_t + 1)
         rows["t"] = np.arange(first, first + count)
         rows["iteration"] = iteration[part] if np.ndim(iteration) else iteration
@@ -135,12 +131,12 @@ class Rows:
                 rows[column][:, at * self._dof : (at + 1) * self._dof] = values[part]
             else:
                 rows[column][:, at] = values[part] if np.ndim(values) else values
-        self.last_t, self._count = first + count - 1, self._count + count
+        self.last_t, self.count = first + count - 1, self.count + count
         return count
 
     def take(self) -> Events:
         """Return the events as a batch, and begin another one."""
-        rows, first = self._rows[: self._count], self._first
+        rows, first = self._rows[: self.count], self._first
         points = np.concatenate([np.empty((0, self._dof)), *self._points])
         columns = EventColumns(
             first, self._dof, rows["kind"], rows["t"], rows["iteration"], rows[INTEGERS],

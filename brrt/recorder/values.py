@@ -11,6 +11,8 @@ from brrt.errors import BrrtError, unknown
 from brrt.events import Named
 from brrt.worlds.arrays import GREATEST
 
+_WHOLE, _REAL = (int, np.integer), (float, int, np.floating, np.integer)
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -55,7 +57,7 @@ def cost_of(cost: Any) -> float:
     Raises:
         BrrtError: It is not a finite number.
     """
-    if isinstance(cost, float | int | np.floating | np.integer):
+    if isinstance(cost, _REAL):
         value = float(cost)
         if -GREATEST < value < GREATEST:
             return value
@@ -83,7 +85,7 @@ def whole(name: str, value: Any, low: int, high: int, what: str) -> int:
     Raises:
         BrrtError: It is not; the message says that it must be `what`.
     """
-    if isinstance(value, int | np.integer) and low <= value < high:
+    if isinstance(value, _WHOLE) and low <= value < high:
         return int(value)
     raise BrrtError(f"{name} must be {what}, not {value!r:.60}")
 
@@ -108,11 +110,13 @@ def choice(name: str, choices: type[Named], value: Any) -> int:
     Raises:
         BrrtError: There is no such member.
     """
+    if isinstance(value, choices):  # the usual case, and the fastest
+        return value
     if isinstance(value, str):
         for each in choices:
             if value in (each.label, each.key):
                 return each
-    elif isinstance(value, int | np.integer) and value in set(choices):
+    elif isinstance(value, _WHOLE) and value in set(choices):
         return int(value)
     raise unknown(name, str(value), [each.label for each in choices])
 
