@@ -1,7 +1,7 @@
 """Temporary names of files that are written, and their final names.
 
-A temporary name cannot be predicted and is made exclusively, so that nobody can put a link there
-for the data to follow.
+A temporary name cannot be predicted and is made exclusively, so that no other process can put a
+link there that redirects the data.
 """
 
 import errno

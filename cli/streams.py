@@ -17,7 +17,7 @@ _PLAIN = {"·": "-", "…": "."}
 class Stream(TextIOWrapper):
     """A text stream that goes to nowhere once it cannot be written.
 
-    Controls in a text are written as escapes, whoever prints it. Rich writes its styles through
+    Controls in a text are written as escapes, in every print. Rich writes its styles through
     `rich_proxied_file`; the texts that it styles are escaped by `console.VisibleConsole`.
 
     Attributes:
@@ -86,7 +86,7 @@ def robust_streams() -> Iterator[None]:
 
 
 def output_error() -> OSError | None:
-    """Return why stdout cannot be written; None if it can, or if nobody reads it any more."""
+    """Return why stdout cannot be written; None if it can, or if its reader has closed it."""
     sys.stdout.flush()
     error = getattr(sys.stdout, "error", None)
     return None if isinstance(error, BrokenPipeError) else error

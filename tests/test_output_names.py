@@ -1,4 +1,4 @@
-"""Names of files that are written: unpredictable at first, and at the end nobody else's."""
+"""Names of files that are written: unpredictable at first; no other process has the final one."""
 
 import os
 import shutil

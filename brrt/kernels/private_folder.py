@@ -1,4 +1,4 @@
-"""Folders and files that nobody else can write to: unpickling a file runs what it says."""
+"""Folders and files that only their owner can write to: unpickling a file runs its code."""
 
 import os
 import stat

@@ -42,7 +42,7 @@ def names_robot_file(spec: str) -> bool:
 
 
 def mark_robot_file(spec: str) -> str:
-    """Return the specification of a file so that it can be told from a robot's name."""
+    """Return the specification of a file so that it differs from a robot's name."""
     return spec if _is_marked(spec) else f"./{spec}"
 
 

@@ -480,7 +480,7 @@ def test_nothing_is_loaded():
 """
 
 
-def test_costs_nothing_and_disturbs_nobody(pytester: pytest.Pytester, run: Pytest) -> None:
+def test_costs_nothing_and_disturbs_no_other_plugin(pytester: pytest.Pytester, run: Pytest) -> None:
     """Whoever does not use it loads two small files, gets no warning and no line of output."""
     pytester.makepyfile(test_a=QUIET)
     done = subprocess.run(

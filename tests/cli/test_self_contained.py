@@ -90,7 +90,7 @@ def watched_files() -> Iterator[list[str]]:
 def test_no_file_that_a_recording_names_is_opened(
     trap: str, suffix: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """A recording without its robot is refused, and what it names may be a pipe nobody feeds."""
+    """A recording without its robot is refused, and what it names may be a silent pipe."""
     if trap == "/trap":
         trap = str(tmp_path / "trap")
     if ":" not in trap:
@@ -111,7 +111,7 @@ def test_no_file_that_a_recording_names_is_opened(
 
 
 def test_a_manifest_states_its_robot() -> None:
-    """Before a program writes a recording that nobody can read."""
+    """Before a program writes a recording that cannot be read."""
     manifest = recorded(Scenario(world="circles2d:n=9", seed=1, iterations=60))[0].manifest
     named = replace(manifest.scenario, robot="mine.json")
     assert replace(manifest, scenario=named).robot is not None

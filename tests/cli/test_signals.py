@@ -47,7 +47,7 @@ def test_ctrl_c_while_files_are_closed(presses: int, tmp_path: Path) -> None:
     """The second says what is being closed, and waits; the third says what is cut."""
     code = PRELUDE.format(2 if presses == 2 else 60)
     process = _start(tmp_path, code, "--seed", "1")
-    _until(process, "closing")  # the run has ended, and nobody has pressed a key
+    _until(process, "closing")  # the run has ended, without a key pressed
     for _ in range(presses):
         process.send_signal(signal.SIGINT)
         time.sleep(0.4)

@@ -86,7 +86,7 @@ def test_document(evil: Path) -> None:
 
 
 def test_styles_and_bars_on_a_terminal() -> None:
-    """Rich's own sequences are sent; those in a text, whoever prints it, are not."""
+    """Rich's own sequences are sent; those in a text are not."""
     code = (
         "import sys\n"
         "from brrt_cli.streams import robust_streams\n"

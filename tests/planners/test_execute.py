@@ -174,7 +174,7 @@ def test_driving_does_not_touch_the_plan(planner: str) -> None:
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_nobody_moves_without_a_path(planner: str) -> None:
+def test_no_moves_without_a_path(planner: str) -> None:
     """A run without a path has no events of the execution."""
     scenario = scenario_of(planner, iterations=1, world="circles2d:n=20,seed=2", smooth=True)
     _, events = planned(scenario)
@@ -183,7 +183,7 @@ def test_nobody_moves_without_a_path(planner: str) -> None:
     assert (events[Kind.PHASE]["name"] == Phase.PLAN).all()
 
 
-def test_nobody_moves_once_interrupted() -> None:
+def test_no_moves_once_interrupted() -> None:
     """Interrupted while smoothing, the run does not begin to execute."""
     run = Run(scenario_of("rrt", smooth=True))
     batches = []

@@ -1,4 +1,4 @@
-"""Recordings that break rules about draws in the long run, and honest ones that do not."""
+"""Recordings that break rules about draws in the long run, and correct ones that do not."""
 
 from collections.abc import Callable
 from dataclasses import replace
