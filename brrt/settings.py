@@ -8,7 +8,7 @@ help texts and the manifest.
 import math
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields
-from typing import Any, Literal, Self, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, Self, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -43,7 +43,14 @@ def param(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Base class of frozen dataclasses whose fields are declared by `param`."""
+    """Base class of frozen dataclasses whose fields are declared by `param`.
+
+    Attributes:
+        greatest_number: Greatest number of a setting that declares none; the least above 0 is its
+            reciprocal.
+    """
+
+    greatest_number: ClassVar[float] = MOST
 
     def __post_init__(self) -> None:
         """Check every value against its declaration.
@@ -54,7 +61,7 @@ class Settings:
         hints = _hints(type(self))
         for f in _params(self):
             value = _typed(f.name, getattr(self, f.name), hints[f.name])
-            _check_range(f.name, value, f.metadata)
+            _check_range(f.name, value, f.metadata, self.greatest_number)
             object.__setattr__(self, f.name, value)
 
     @classmethod
@@ -202,17 +209,17 @@ def _as_bool(name: str, value: Any) -> bool:
     return text in _TRUE
 
 
-def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:
+def _check_range(name: str, value: Any, meta: Mapping[str, Any], greatest: float) -> None:
     if not isinstance(value, int | float):
         return
     if isinstance(value, float) and not math.isfinite(value):
         raise BrrtError(f"{name} must be a finite number, not {value}")
     whole = isinstance(value, int)
-    most_of_all = MOST_WHOLE if whole else MOST
+    most_of_all = MOST_WHOLE if whole else greatest
     low, above, high = meta["low"], meta["above"], meta["high"]
     high = most_of_all if high is None else high
     if low is None:
-        low = -most_of_all if above is None else 1 / MOST if above == 0 else above
+        low = -most_of_all if above is None else 1 / greatest if above == 0 else above
     text = f"{_text(value):.60}"
     if above is not None and value <= above:
         raise BrrtError(f"{name} must be above {above:g}, not {text}")
@@ -220,6 +227,7 @@ def _check_range(name: str, value: Any, meta: Mapping[str, Any]) -> None:
     if not whole:
         text, least, most = against_limits(value, low, high)
     if value < low:
-        raise BrrtError(f"{name} must be at least {least}, not {text}")
+        remedy = "; choose a smaller unit" if low == 1 / greatest else ""
+        raise BrrtError(f"{name} must be at least {least}, not {text}{remedy}")
     if value > high:
         raise BrrtError(f"{name} must be at most {most}, not {text}")

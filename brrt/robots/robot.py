@@ -30,6 +30,7 @@ class Robot(Settings):
         kind: The robot's name in the registry and in files.
     """
 
+    greatest_number: ClassVar[float] = GREATEST
     kind: ClassVar[str]
 
     def resolved(self, world: World) -> Self:  # noqa: ARG002

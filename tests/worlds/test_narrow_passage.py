@@ -124,7 +124,7 @@ def test_what_no_disc_gets_through_is_proven(seed: int) -> None:
     ends = rng.permutation(np.argwhere(free))[:2]
     start, goal = (np.array([column + 0.5, row + 0.5]) for row, column in ends)
     bound = max_width(
-        World.of_grid("map", Grid(~free, np.zeros(2), 1.0)), start, goal, 1 << 13, 9.0
+        World.of_grid("map", Grid(~free, np.zeros(2), 1.0)), start, goal, 1 << 15, 9.0
     )
     square = clearance(free.T, np.ones(2), 32)
     least = _widest(square, *(tuple(np.floor(end).astype(int)) for end in (start, goal)))

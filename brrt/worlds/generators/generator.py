@@ -11,7 +11,7 @@ import numpy as np
 from brrt.digits import against_limits
 from brrt.errors import BrrtError
 from brrt.settings import Settings, param
-from brrt.worlds.arrays import Floats, check_lengths, read_numbers
+from brrt.worlds.arrays import GREATEST, Floats, check_lengths, read_numbers
 from brrt.worlds.free_space import connected
 from brrt.worlds.generators.clearing import clear_ends
 from brrt.worlds.world import World
@@ -61,6 +61,7 @@ class Generator(Settings):
         clears: Whether obstacles close to start or goal are left out; others are structures.
     """
 
+    greatest_number: ClassVar[float] = GREATEST
     dim: ClassVar[int]
     draws: ClassVar[int] = 1
     clears: ClassVar[bool] = False

@@ -27,6 +27,7 @@ class Loader(Settings):
         queries: What `#` after the file selects; empty for formats without queries.
     """
 
+    greatest_number: ClassVar[float] = GREATEST
     endings: ClassVar[tuple[str, ...]] = ()
     queries: ClassVar[str] = ""
 
