@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import pytest
+
 from brrt import Kind
 from brrt.events import Source
 from brrt.scenario.contract import Draws
@@ -14,6 +16,7 @@ from tests.support.cases import (
     doctored,
     on,
     planned,
+    run_of,
     short,
 )
 from tests.verification.rules.test_long_run import informed, log_of, reused
@@ -49,3 +52,15 @@ def test_doctored_recordings_are_found(
 ) -> None:
     """By the rule that they break."""
     check_found(rule, message, make, also)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-14, 1e-9])
+def test_a_goal_at_the_start_leaves_few_informed_samples(apart: float) -> None:
+    """The ellipsoid then holds few numbers, so samples repeat without a fault."""
+    goal = (50.0 + apart, 50.0)
+    case = run_of(
+        world="empty2d", planner="rrt-star", start=(50.0, 50.0), goal=goal, smooth=False,
+        params={"informed": True, "step": 5.0}, iterations=1500,
+    )  # fmt: skip
+    assert len(case.log[Kind.PATH])
+    assert case.broken() == set()
