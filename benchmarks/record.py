@@ -3,7 +3,8 @@
     python benchmarks/record.py [--events 200000]
 
 Processor time of the calling thread for each event: one by one, and in arrays. The stock writer
-writes the same edges as JSON, on the calling thread. Times are medians of five rounds.
+writes the same edges as JSON, on the calling thread. The last row is a call of `brrt.log` while no
+recording is open. Times are medians of five rounds.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import Writer
 
-from brrt import Recorder, World, record
+from brrt import Recorder, World, log, record
 
 ROUNDS = 5
 Q = np.random.default_rng(0).uniform(1, 9, (100_000, 2))
@@ -94,6 +95,17 @@ def stock(n: int, path: Path) -> float:
     return statistics.median(times)
 
 
+def unheard(n: int) -> float:
+    """Return the time for a call of `brrt.log` while no recording is open, in ns."""
+    q, times = [1.0, 2.0], []
+    for _ in range(ROUNDS):
+        before = time.thread_time()
+        for _ in range(n):
+            log.edge(q, 0)
+        times.append((time.thread_time() - before) / n * 1e9)
+    return statistics.median(times)
+
+
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(
@@ -111,6 +123,7 @@ def main() -> None:
             caller, whole = cost(n, work, path)
             print(f"{name:28}{caller:10.0f}{whole:13.0f}")
         print(f"{'stock mcap writer, JSON':28}{stock(min(n, len(Q)), path):10.0f}")
+    print(f"{'brrt.log.edge, none open':28}{unheard(n):10.0f}")
 
 
 if __name__ == "__main__":
