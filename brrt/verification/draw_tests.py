@@ -269,6 +269,8 @@ class RelationTest:
 
     def add(self, draws: Floats) -> None:
         """See `EProcess.add`; shape (n, dof). Those beyond the first `_RELATED` are ignored."""
+        if self._n == _RELATED:
+            return
         rows = np.concatenate([self._last, draws[:, : self._dof]])
         self._last = rows[-1:]
         pairs = np.concatenate([rows[:-1], rows[1:]], axis=1)[: _RELATED - self._n]
