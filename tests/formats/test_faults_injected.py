@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import pytest
 
+import brrt
 from brrt import RecordingError, Scenario, read
 from brrt.formats.mcap.container import Container
 from tests.conftest import Result, recorded
@@ -119,20 +120,22 @@ class Memory:
     def __call__(self, frame: Any, event: str, _: Any) -> None:
         """Take a call, as `sys.settrace` hands it over."""
         file, name = frame.f_code.co_filename, frame.f_code.co_name
-        if event == "call" and "/brrt/" in file and any(part in file for part in WRITERS):
+        if event == "call" and file.startswith(WRITERS):
             self.calls.append(f"{file.rpartition('/')[2]}:{name}")
             if len(self.calls) - 1 == self._place:
                 raise MemoryError
 
     def __enter__(self) -> Self:
+        self._before = sys.gettrace()
         sys.settrace(self)
         return self
 
     def __exit__(self, *_: object) -> None:
-        sys.settrace(None)
+        sys.settrace(self._before)
 
 
-WRITERS = ("/formats/", "/views/rerun/", "/files.py")
+PACKAGE = Path(brrt.__path__[0])
+WRITERS = tuple(str(PACKAGE / part) for part in ("formats", "views/rerun", "files.py"))
 CLEANING = ("<", "close", "_disconnect", "truncate")
 """What releases files must be called; where that fails, the process ends and takes them along."""
 
