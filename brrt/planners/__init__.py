@@ -98,6 +98,9 @@ def state_contract(planner: Any, query: Query, given: Planner | None = None) -> 
         "gamma": None if near is None else near.gamma,
         "connect_distance": contract.link,
     }
+    if contract.lattice is not None:
+        lattice = contract.lattice.as_dict()
+        lengths |= {name: lattice[name] for name in ("epsilon", "diagonals", "max_move")}
     about = PlannerInfo(
         registered=type(planner) in PLANNERS.values(),
         default_iterations=planner.default_iterations,

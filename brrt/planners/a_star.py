@@ -23,6 +23,7 @@ from brrt.robots import Point
 from brrt.scenario import contract
 from brrt.scenario.query import Query
 from brrt.settings import param
+from brrt.worlds.free_space import grid_only
 
 _ROUNDING = 1e-12
 
@@ -37,21 +38,44 @@ class LatticePlanner(KernelPlanner):
     fixed_params: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
     continuous: ClassVar[str | None] = "rrt-connect"
 
-    epsilon: float = param(0.5, "edge of a cell", above=0)
-    diagonals: bool = param(False, "move to all neighbours (26 in 3D), not only across faces")
-    max_move: float = param(1.0, "longest straight move to the goal", low=0)
+    epsilon: float | None = param(
+        None,
+        "edge of a cell; by default that of a grid map's cells, and otherwise 0.5 or what is "
+        "nearest to it between 0.5 % and 5 % of the world's longest side",
+        above=0,
+    )
+    diagonals: bool | None = param(
+        None, "move to all neighbours (26 in 3D), not only across faces; by default on grid maps"
+    )
+    max_move: float | None = param(
+        None, "longest straight move to the goal; by default twice the default edge", low=0
+    )
+
+    def resolved(self, query: Query) -> contract.Lattice:
+        """Return the lattice in a world, with the settings that are automatic."""
+        world = query.world
+        grid = grid_only(world)
+        edge = float(np.clip(0.5, world.extent / 200, world.extent / 20))
+        usual = edge if grid is None else grid.resolution
+        return contract.Lattice(
+            usual if self.epsilon is None else self.epsilon,
+            grid is not None if self.diagonals is None else self.diagonals,
+            2 * usual if self.max_move is None else self.max_move,
+            lookahead=None,
+        )
 
     def check(self, query: Query) -> None:
         """See `Planner.check`: the goal must be within a move of a cell."""
         if not isinstance(query.robot, Point):
             return
+        grid = self.resolved(query)
         low, high = (query.lower - query.start, query.upper - query.start)
-        along = np.rint((query.goal - query.start) / self.epsilon)
-        along = np.clip(along, np.ceil(low / self.epsilon), np.floor(high / self.epsilon))
-        far = float(query.robot.distance(query.start + self.epsilon * along, query.goal))
-        if far * (1 - _ROUNDING) > self.max_move:
+        along = np.rint((query.goal - query.start) / grid.epsilon)
+        along = np.clip(along, np.ceil(low / grid.epsilon), np.floor(high / grid.epsilon))
+        far = float(query.robot.distance(query.start + grid.epsilon * along, query.goal))
+        if far * (1 - _ROUNDING) > grid.max_move:
             raise BrrtError(
-                f"max_move {self.max_move:g} is too small: the goal is {far:g} from the nearest "
+                f"max_move {grid.max_move:g} is too small: the goal is {far:g} from the nearest "
                 f"cell; it must be at least {at_least(far)}, or choose another epsilon"
             )
 
@@ -66,16 +90,16 @@ class LatticePlanner(KernelPlanner):
                 "planners on a lattice move a point; use --robot point, or --planner rrt for "
                 "this robot"
             )
-        least = problem.world.extent / MAX_CELLS
-        if self.epsilon < least:
+        grid, least = self.resolved(problem), problem.world.extent / MAX_CELLS
+        if grid.epsilon < least:
             raise BrrtError(
-                f"epsilon {self.epsilon:g} is too small for this world; "
+                f"epsilon {grid.epsilon:g} is too small for this world; "
                 f"it must be at least {at_least(least, 2)}"
             )
-        sides = (problem.world.upper - problem.world.lower) / self.epsilon + 1
+        sides = (problem.world.upper - problem.world.lower) / grid.epsilon + 1
         room = 32 + int(min(float(sides.prod()), _FIRST_ROOM))
         ends = problem.start, problem.goal
-        return rooted_lattice(*ends, self.epsilon, self.max_move, room, diagonals=self.diagonals)
+        return rooted_lattice(*ends, grid.epsilon, grid.max_move, room, diagonals=grid.diagonals)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +110,9 @@ class AStar(LatticePlanner):
     closer to the goal, then to the oldest.
     """
 
-    def contract(self, query: Query) -> contract.Contract:  # noqa: ARG002
+    def contract(self, query: Query) -> contract.Contract:
         """See `Planner.contract`."""
-        grid = contract.Lattice(self.epsilon, self.diagonals, self.max_move, lookahead=None)
-        return contract.Contract(lattice=grid)
+        return contract.Contract(lattice=self.resolved(query))
 
     def kernel(self, problem: Problem, stop: Stop) -> Kernel[Any]:  # noqa: ARG002
         """See `KernelPlanner.kernel`."""

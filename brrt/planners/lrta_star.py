@@ -36,12 +36,11 @@ class LRTAStar(LatticePlanner):
     lookahead: int = param(1, "cells to expand before a move", low=1, high=_MOST_AHEAD)
     trials: int = param(1, "runs from the start, each with what the ones before learned", low=1)
 
-    def contract(self, query: Query) -> contract.Contract:  # noqa: ARG002
+    def contract(self, query: Query) -> contract.Contract:
         """See `Planner.contract`."""
-        grid = contract.Lattice(
-            self.epsilon, self.diagonals, self.max_move, self.lookahead,
-            ordered=True, trials=self.trials,
-        )  # fmt: skip
+        grid = replace(
+            self.resolved(query), lookahead=self.lookahead, ordered=True, trials=self.trials
+        )
         return contract.Contract(lattice=grid)
 
     def replan_kernel(self, problem: Problem) -> Kernel[Any]:

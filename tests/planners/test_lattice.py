@@ -27,8 +27,9 @@ from brrt.planners.base.problem import Problem
 from brrt.planners.base.stop import Stop
 from brrt.robots import Point, Polygon
 from brrt.runs.run import Run
+from brrt.scenario.contract import Contract, Lattice
 from brrt.scenario.scenario import Scenario
-from brrt.worlds import World
+from brrt.worlds import Grid, World
 from tests.conftest import Result
 from tests.support import naive
 from tests.support.naive_lattice import Emitted, Twin, costs_to_go
@@ -66,7 +67,8 @@ def twin_of(problem: Problem, planner: AStar | LRTAStar) -> Twin:
     def free(a: Floats, b: Floats) -> bool:
         return bool(is_free(problem.space, np.array([a, b])))
 
-    options = {name: getattr(planner, name) for name in ("epsilon", "diagonals", "max_move")}
+    grid = planner.resolved(problem)
+    options = {name: getattr(grid, name) for name in ("epsilon", "diagonals", "max_move")}
     return Twin(problem.world, problem.start, problem.goal, free, **options)
 
 
@@ -162,11 +164,12 @@ def check_paths(problem: Problem, planner: AStar | LRTAStar, events: Events) -> 
         assert naive.path_is_free(problem.world, q)
         steps = np.diff(q, axis=0)
         axes = (np.abs(steps) > 1e-9).sum(axis=1)
-        cells = np.abs(steps) / planner.epsilon
+        grid = planner.resolved(problem)
+        cells = np.abs(steps) / grid.epsilon
         assert ((np.abs(cells - np.round(cells)) < 1e-9) & (cells < 1.5))[:-1].all()
-        assert (axes[:-1] <= (problem.dof if planner.diagonals else 1)).all()
-        if len(steps) and axes[-1] > 1 and not planner.diagonals:
-            assert math.hypot(*steps[-1]) <= planner.max_move * (1 + ROUNDING)
+        assert (axes[:-1] <= (problem.dof if grid.diagonals else 1)).all()
+        if len(steps) and axes[-1] > 1 and not grid.diagonals:
+            assert math.hypot(*steps[-1]) <= grid.max_move * (1 + ROUNDING)
 
 
 @SOME
@@ -447,3 +450,28 @@ def test_a_goal_that_no_cell_is_near(planner: str) -> None:
             Run(scenario)
         run = Run(replace(scenario, params=params | {"max_move": float(least)}, iterations=1000))
         assert run.execute().solved
+
+
+def test_default_cells() -> None:
+    """Half a unit where that suits the map; a part of its side otherwise; cells of a grid map."""
+    for size, edge in ((0.01, 5e-4), (1.0, 0.05), (10.0, 0.5), (100.0, 0.5), (1e5, 500.0)):
+        ends = {"start": (0.1 * size, 0.1 * size), "goal": (0.93 * size, 0.88 * size)}
+        for planner in ("a-star", "lrta-star"):
+            run = Run(Scenario(world=f"empty2d:size={size:g}", planner=planner, **ends))
+            lattice = (run.manifest.contract or Contract()).lattice
+            assert lattice is not None
+            assert (lattice.epsilon, lattice.max_move) == pytest.approx((edge, 2 * edge))
+            assert not lattice.diagonals
+            assert run.execute().solved
+            chosen = (run.manifest.contract or Contract()).planner.chosen
+            assert chosen == {"epsilon": lattice.epsilon, "diagonals": False,
+                              "max_move": lattice.max_move}  # fmt: skip
+    cells = np.zeros((6, 300), bool)
+    cells[:5, 100] = True
+    world = World.of_grid("grid", Grid(cells, np.zeros(2), 1.0))
+    run = Run(
+        Scenario(planner="a-star", start=(0.5, 0.5), goal=(299.5, 0.5), smooth=False), world=world
+    )
+    assert AStar().resolved(run.problem) == Lattice(1.0, True, 2.0, None)
+    # Diagonals on both sides of the wall, whose corners are not cut.
+    assert run.execute().as_dict()["path_cost"] == pytest.approx(299 + 10 * (2**0.5 - 1))

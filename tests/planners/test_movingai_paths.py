@@ -34,10 +34,9 @@ def planned(world: str, planner: str, **settings: Any) -> dict[str, Any]:
 
 @EVERY
 def test_a_star_finds_the_stated_optima(path: Path) -> None:
-    """On every scenario that there is, to 1e-3."""
-    params = {"epsilon": 1.0, "diagonals": True}
+    """By default, on every scenario that there is, to 1e-3."""
     for number, length in enumerate(lengths(path)):
-        figures = planned(f"{path}#{number}", "a-star", params=params, smooth=False)
+        figures = planned(f"{path}#{number}", "a-star", smooth=False)
         assert figures["path_cost"] == pytest.approx(length, abs=1e-3)
 
 
