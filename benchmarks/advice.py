@@ -67,12 +67,12 @@ CASES: dict[str, tuple[dict[str, Any], World | None]] = {
     "star, short": ({"world": "circles2d:n=60", "planner": "rrt-star", "iterations": 1500}, None),
     "star, gap": ({"world": "gap2d:gap=1", "planner": "rrt-star", "iterations": 3000}, None),
     "lrta, bug trap": ({"world": "bugtrap2d", "planner": "lrta-star",
-                        "params": {"epsilon": 2}}, None),
+                        "params": {"cell": 2}}, None),
     "lrta, few iterations": ({"world": "bugtrap2d", "planner": "lrta-star",
                               "iterations": 500}, None),
     "a-star, few iterations": ({"world": "maze2d", "planner": "a-star", "iterations": 300}, None),
     "a-star, coarse cells": ({"world": "passage2d:gap=2", "planner": "a-star",
-                              "params": {"epsilon": 7.5}}, None),
+                              "params": {"cell": 7.5}}, None),
 }  # fmt: skip
 
 

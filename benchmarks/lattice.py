@@ -71,7 +71,7 @@ def grids(folder: Path) -> dict[str, Scenario]:
         path.write_text("\n".join(["type octile", f"height {SIDE}", f"width {SIDE}", "map", *rows]))
         found[name] = Scenario(
             world=str(path), start=(0.5, 0.5), goal=(SIDE - 0.5, SIDE - 0.5), planner="a-star",
-            params={"epsilon": 1.0, "diagonals": True}, smooth=False,
+            params={"cell": 1.0, "diagonals": True}, smooth=False,
         )  # fmt: skip
     return found
 

@@ -28,8 +28,8 @@ SCENARIOS: dict[str, tuple[float, dict[str, Any]]] = {
     "rrt-connect": (4.0, {"params": {"step": 0.002}}),
     "rrt-star": (3.0, {"params": {"step": 4.0}}),
     "bi-rrt-star": (6.0, {"params": {"step": 4.0}}),
-    "lrta-star": (2.4, {"params": {"epsilon": 0.01, "max_move": 0.0}}),
-    "a-star": (1.0, {"params": {"epsilon": 0.02, "max_move": 0.0}}),
+    "lrta-star": (2.4, {"params": {"cell": 0.01, "max_move": 0.0}}),
+    "a-star": (1.0, {"params": {"cell": 0.02, "max_move": 0.0}}),
 }
 """For each planner: events that come of an iteration, and what of a scenario is its own."""
 

@@ -60,7 +60,7 @@ def _outcome(m: Mapping[str, Any]) -> str:
         return "solved" if m["status"] == "solved" else f"solved, ended by: {m['status']}"
     if m["status"] == "no path":
         return (
-            "not solved, no path on the lattice; smaller cells (--param epsilon=) or "
+            "not solved, no path on the lattice; smaller cells (--param cell=) or "
             "a longer move to the goal (--param max_move=) may give one"
         )
     return f"not solved, {m['status']}"

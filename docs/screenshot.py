@@ -57,10 +57,10 @@ PICTURES = {
     "polygon.png": Picture((f"{ROOT}/examples/house-hard.toml",), "--at-event 1422"),
     "chain.png": Picture((f"{ROOT}/examples/arm-hard.toml",), "--at-event 619"),
     "lrta2d.png": Picture(
-        ("--planner lrta-star --world bugtrap2d --param epsilon=1",), "--at-iteration 30000"
+        ("--planner lrta-star --world bugtrap2d --param cell=1",), "--at-iteration 30000"
     ),
     "lrta3d.png": Picture(
-        ("--planner lrta-star --world window3d --param epsilon=1",), "--at-iteration 8000"
+        ("--planner lrta-star --world window3d --param cell=1",), "--at-iteration 8000"
     ),
     "web.png": Picture(("--planner rrt-connect --world maze2d:seed=4 --seed 2",), "web"),
     "plot.png": Picture((), f"plot {ROOT}/recordings/circles2d-rrt-star.mcap --dpi 150"),

@@ -62,7 +62,7 @@ def short_move(f: Facts) -> Advice | None:
     lattice, approach = f.contract.lattice, f.approach
     if lattice is None or approach is None or approach.hit is not None:
         return None
-    if approach.far * (1 - 1e-9) <= lattice.max_move or approach.far > 2 * lattice.epsilon:
+    if approach.far * (1 - 1e-9) <= lattice.max_move or approach.far > 2 * lattice.cell:
         return None
     why = (
         f"the goal is {approach.far:.3g} from the nearest cell that was reached, and the longest "
@@ -76,39 +76,39 @@ def large_cells(f: Facts) -> Advice | None:
     lattice = f.contract.lattice
     if lattice is None or f.figures["status"] != "no path":
         return None
-    cells = f"cells of {lattice.epsilon:g}"
+    cells = f"cells of {lattice.cell:g}"
     if f.narrow is None:
         # Half of the bound on the width, or a quarter of the cells if that is smaller.
         most = math.inf if f.clearance.widest is None else f.clearance.widest / 2
-        epsilon = rounded(min(lattice.epsilon / 4, most), 2)
-        return _finer(f, f"{cells} have no path, and {f.clearance.reason}", epsilon)
+        edge = rounded(min(lattice.cell / 4, most), 2)
+        return _finer(f, f"{cells} have no path, and {f.clearance.reason}", edge)
     # A straight passage along an axis that is wider than a cell contains a line of the lattice;
     # one that is oblique or bends may need smaller cells.
     fitting = rounded(_FITS * max(f.narrow.low, f.narrow.high / 4), 2)
-    if lattice.epsilon <= fitting:
+    if lattice.cell <= fitting:
         why = f"{cells} have no path, although the passage is {width_of(f)} wide"
-        return _finer(f, why, rounded(lattice.epsilon / 2, 2))
+        return _finer(f, why, rounded(lattice.cell / 2, 2))
     return _finer(f, f"{cells} are too large for a passage that is {width_of(f)} wide", fitting)
 
 
-def _finer(f: Facts, why: str, epsilon: float) -> Advice:
+def _finer(f: Facts, why: str, edge: float) -> Advice:
     """Advise smaller cells and as many expansions; for too many cells, another planner."""
-    cells = _cells(f, epsilon)
+    cells = _cells(f, edge)
     about = f.contract.planner
     if cells > _ROOM and about.continuous is not None:
-        why = f"{why}; there are {cells:.2g} cells of {epsilon:g}"
+        why = f"{why}; there are {cells:.2g} cells of {edge:g}"
         return replan(f, why, planner=about.continuous)
-    params = {"epsilon": epsilon}
-    if f.contract.lattice is not None and f.contract.lattice.max_move < 2 * epsilon:
-        params["max_move"] = 2 * epsilon  # no point is farther from the nearest cell
+    params = {"cell": edge}
+    if f.contract.lattice is not None and f.contract.lattice.max_move < 2 * edge:
+        params["max_move"] = 2 * edge  # no point is farther from the nearest cell
     if cells > f.scenario.iteration_limit(about.default_iterations):
         return replan(f, why, params=params, iterations=cells)
     return replan(f, why, params=params)
 
 
-def _cells(f: Facts, epsilon: float) -> int:
+def _cells(f: Facts, edge: float) -> int:
     """Return how many cells of a size the bounds hold."""
-    return math.prod(int(side / epsilon) + 1 for side in f.sides)
+    return math.prod(int(side / edge) + 1 for side in f.sides)
 
 
 def goal_bias(f: Facts) -> Advice | None:
@@ -206,7 +206,7 @@ def all_cells(f: Facts) -> Advice | None:
     lattice = f.contract.lattice
     if lattice is None or f.contract.learns or f.figures["status"] != "iteration limit":
         return None
-    cells = _cells(f, lattice.epsilon)
+    cells = _cells(f, lattice.cell)
     if cells <= f.figures["iterations"]:
         return None
     why = (

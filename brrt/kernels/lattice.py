@@ -73,7 +73,7 @@ class LatticeArrays(NamedTuple):
         deltas: Difference of a neighbour's key in each direction, shape (directions,).
         costs: Length of a motion in each direction, shape (directions,).
         opposite: The opposite of each direction, shape (directions,).
-        epsilon: Edge of a cell.
+        edge: Edge of a cell.
         max_move: The goal is reached by a straight motion of at most this length.
     """
 
@@ -88,7 +88,7 @@ class LatticeArrays(NamedTuple):
     deltas: Longs
     costs: Floats
     opposite: Ints
-    epsilon: float
+    edge: float
     max_move: float
 
 
@@ -131,14 +131,14 @@ def directions(dim: int, *, diagonals: bool) -> list[tuple[int, ...]]:
 
 
 def rooted_lattice(
-    start: Floats, goal: Floats, epsilon: float, max_move: float, capacity: int, *, diagonals: bool
+    start: Floats, goal: Floats, edge: float, max_move: float, capacity: int, *, diagonals: bool
 ) -> LatticeArrays:
     """Make a lattice whose only cell is the start.
 
     Args:
         start: Start, shape (d,).
         goal: Goal, shape (d,).
-        epsilon: Edge of a cell.
+        edge: Edge of a cell.
         max_move: Longest motion to the goal.
         capacity: Number of cells to make room for.
         diagonals: Whether cells that share only a corner or an edge are neighbours.
@@ -155,9 +155,9 @@ def rooted_lattice(
         counts=np.array([1, 0, 0]),
         goal=np.array([goal]),
         deltas=np.array([sum(x << _BITS * k for k, x in enumerate(step)) for step in steps]),
-        costs=epsilon * np.sqrt([sum(map(abs, step)) for step in steps]),
+        costs=edge * np.sqrt([sum(map(abs, step)) for step in steps]),
         opposite=np.array([steps.index(tuple(-x for x in step)) for step in steps], np.int32),
-        epsilon=epsilon,
+        edge=edge,
         max_move=max_move,
     )
     lattice.keys[0] = sum(_OFFSET << _BITS * k for k in range(len(start)))
@@ -267,7 +267,7 @@ def find_neighbours(
                 other = int(counts[CELLS])
                 for axis in range(len(space.lower)):
                     along = ((key >> (_BITS * axis)) & _MASK) - _OFFSET
-                    x = q[0, axis] + lattice.epsilon * along
+                    x = q[0, axis] + lattice.edge * along
                     q[other, axis] = x
                     if x < space.lower[axis] or x > space.upper[axis]:
                         reason = _LIMITS

@@ -100,7 +100,7 @@ def state_contract(planner: Any, query: Query, given: Planner | None = None) -> 
     }
     if contract.lattice is not None:
         lattice = contract.lattice.as_dict()
-        lengths |= {name: lattice[name] for name in ("epsilon", "diagonals", "max_move")}
+        lengths |= {name: lattice[name] for name in ("cell", "diagonals", "max_move")}
     about = PlannerInfo(
         registered=type(planner) in PLANNERS.values(),
         default_iterations=planner.default_iterations,

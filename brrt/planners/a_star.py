@@ -35,10 +35,10 @@ _FIRST_ROOM = 1 << 18
 class LatticePlanner(KernelPlanner):
     """Base of searches on a lattice whose origin is the start."""
 
-    fixed_params: ClassVar[tuple[str, ...]] = ("epsilon", "diagonals", "max_move")
+    fixed_params: ClassVar[tuple[str, ...]] = ("cell", "diagonals", "max_move")
     continuous: ClassVar[str | None] = "rrt-connect"
 
-    epsilon: float | None = param(
+    cell: float | None = param(
         None,
         "edge of a cell; by default that of a grid map's cells, and otherwise 0.5 or what is "
         "nearest to it between 0.5 % and 5 % of the world's longest side",
@@ -48,19 +48,18 @@ class LatticePlanner(KernelPlanner):
         None, "move to all neighbours (26 in 3D), not only across faces; by default on grid maps"
     )
     max_move: float | None = param(
-        None, "longest straight move to the goal; by default twice the default edge", low=0
+        None, "longest straight move to the goal; by default twice `cell`", low=0
     )
 
     def resolved(self, query: Query) -> contract.Lattice:
         """Return the lattice in a world, with the settings that are automatic."""
-        world = query.world
-        grid = grid_only(world)
-        edge = float(np.clip(0.5, world.extent / 200, world.extent / 20))
-        usual = edge if grid is None else grid.resolution
+        extent, grid = query.world.extent, grid_only(query.world)
+        usual = grid.resolution if grid else float(np.clip(0.5, extent / 200, extent / 20))
+        cell = usual if self.cell is None else self.cell
         return contract.Lattice(
-            usual if self.epsilon is None else self.epsilon,
+            cell,
             grid is not None if self.diagonals is None else self.diagonals,
-            2 * usual if self.max_move is None else self.max_move,
+            2 * cell if self.max_move is None else self.max_move,
             lookahead=None,
         )
 
@@ -70,13 +69,13 @@ class LatticePlanner(KernelPlanner):
             return
         grid = self.resolved(query)
         low, high = (query.lower - query.start, query.upper - query.start)
-        along = np.rint((query.goal - query.start) / grid.epsilon)
-        along = np.clip(along, np.ceil(low / grid.epsilon), np.floor(high / grid.epsilon))
-        far = float(query.robot.distance(query.start + grid.epsilon * along, query.goal))
+        along = np.rint((query.goal - query.start) / grid.cell)
+        along = np.clip(along, np.ceil(low / grid.cell), np.floor(high / grid.cell))
+        far = float(query.robot.distance(query.start + grid.cell * along, query.goal))
         if far * (1 - _ROUNDING) > grid.max_move:
             raise BrrtError(
                 f"max_move {grid.max_move:g} is too small: the goal is {far:g} from the nearest "
-                f"cell; it must be at least {at_least(far)}, or choose another epsilon"
+                f"cell; it must be at least {at_least(far)}, or choose a smaller cell"
             )
 
     def _lattice(self, problem: Problem) -> LatticeArrays:
@@ -91,15 +90,15 @@ class LatticePlanner(KernelPlanner):
                 "this robot"
             )
         grid, least = self.resolved(problem), problem.world.extent / MAX_CELLS
-        if grid.epsilon < least:
+        if grid.cell < least:
             raise BrrtError(
-                f"epsilon {grid.epsilon:g} is too small for this world; "
+                f"cell {grid.cell:g} is too small for this world; "
                 f"it must be at least {at_least(least, 2)}"
             )
-        sides = (problem.world.upper - problem.world.lower) / grid.epsilon + 1
+        sides = (problem.world.upper - problem.world.lower) / grid.cell + 1
         room = 32 + int(min(float(sides.prod()), _FIRST_ROOM))
         ends = problem.start, problem.goal
-        return rooted_lattice(*ends, grid.epsilon, grid.max_move, room, diagonals=grid.diagonals)
+        return rooted_lattice(*ends, grid.cell, grid.max_move, room, diagonals=grid.diagonals)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ class Near(Settings):
 class Lattice(Settings):
     """The lattice that a search moves on; its origin is the start."""
 
-    epsilon: float = param(None, "edge of a cell", above=0)
+    cell: float = param(None, "edge of a cell", above=0)
     diagonals: bool = param(None, "moves lead to all 26 (in 2D 8) neighbours, not to 6 (4)")
     max_move: float = param(None, "longest straight move to the goal", low=0)
     lookahead: int | None = param(
@@ -160,9 +160,9 @@ class Contract(Settings):
     planner: PlannerInfo = field(default_factory=PlannerInfo)
 
     @property
-    def epsilon(self) -> float:
+    def cell(self) -> float:
         """Edge of the lattice's cells; 0 without a lattice."""
-        return 0.0 if self.lattice is None else self.lattice.epsilon
+        return 0.0 if self.lattice is None else self.lattice.cell
 
     @property
     def improves(self) -> bool:
@@ -185,12 +185,24 @@ class Contract(Settings):
         Raises:
             BrrtError: A value is wrong, or a field is unknown here.
         """
+        lattice = values.get("lattice") if isinstance(values, dict) else None
+        if isinstance(lattice, dict) and "epsilon" in lattice:
+            values = _renamed(values)
         return _read(cls, "a contract", values)
 
 
 _PARTS: Mapping[str, type[Settings]] = {
     "near": Near, "lattice": Lattice, "draws": Draws, "growth": Growth, "planner": PlannerInfo,
 }  # fmt: skip
+
+
+def _renamed(values: Any) -> Any:
+    """Return values of a contract in which the setting `cell` has its former name, `epsilon`."""
+    if isinstance(values, dict):
+        return {"cell" if key == "epsilon" else key: _renamed(v) for key, v in values.items()}
+    if isinstance(values, list):
+        return ["cell" if value == "epsilon" else value for value in values]
+    return values
 
 
 def _read(kind: type[S], name: str, values: Any) -> S:

@@ -24,6 +24,12 @@ from brrt.worlds.world import World
 _FORMER_STEP: Mapping[str, float] = {"rrt-star": 0.2, "bi-rrt-star": 0.2}
 """Default step, as a part of the world's longest side, of recordings that state no contract."""
 
+_FORMER_SETTINGS: Mapping[str, Mapping[str, Any]] = {
+    planner: {"cell": 0.5, "diagonals": False, "max_move": 1.0}
+    for planner in ("a-star", "lrta-star")
+}
+"""Defaults of recordings that state no contract, where today's depend on the world."""
+
 
 def as_planned(manifest: Manifest, world: World) -> tuple[Scenario, ...]:
     """Return the scenario of each of a run's `stretches` with the settings that were in use.
@@ -36,9 +42,12 @@ def as_planned(manifest: Manifest, world: World) -> tuple[Scenario, ...]:
 
 
 def _as_planned(scenario: Scenario, contract: Contract | None, world: World) -> Scenario:
-    used = {} if contract is None else {**contract.planner.settings, **contract.planner.chosen}
-    if contract is None and scenario.planner in _FORMER_STEP:
-        used["step"] = _FORMER_STEP[scenario.planner] * world.extent
+    if contract is None:
+        used = dict(_FORMER_SETTINGS.get(scenario.planner, {}))
+        if scenario.planner in _FORMER_STEP:
+            used["step"] = _FORMER_STEP[scenario.planner] * world.extent
+    else:
+        used = {**contract.planner.settings, **contract.planner.chosen}
     if used.get("connect_distance") == used.get("step"):
         used.pop("connect_distance", None)  # it follows the step, which a branch may change
     used |= {name: value for name, value in scenario.params.items() if value is not None}
@@ -143,7 +152,8 @@ def planner_settings(manifest: Manifest) -> tuple[Mapping[str, Any], ...]:
         if contract is not None:
             found.append(contract.planner.settings or scenario.params)
         elif planner is not None:
-            found.append(planner.as_dict())
+            former = _FORMER_SETTINGS.get(scenario.planner, {})
+            found.append({**planner.as_dict(), **former, **scenario.params})
         else:
             return tuple(scenario.params for _, scenario in manifest.stretches)
     return tuple(found)

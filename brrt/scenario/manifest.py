@@ -14,9 +14,6 @@ from brrt.robots import ROBOTS, Robot, mark_robot_file, names_robot_file, robot_
 from brrt.scenario.contract import Contract
 from brrt.scenario.scenario import Scenario
 
-_FORMER_LATTICE: Mapping[str, Any] = {"epsilon": 0.5, "diagonals": False, "max_move": 1.0}
-"""Settings of planners on a lattice that were fixed by default, and depend on the world now."""
-
 
 @dataclass(frozen=True, slots=True)
 class Branch:
@@ -59,8 +56,7 @@ class Branch:
             TypeError: A field is unknown.
             ValueError: A number is malformed, or below 0.
         """
-        scenario = _with_former(_scenario(values["scenario"]), contract)
-        known = {**values, "scenario": scenario}
+        known = {**values, "scenario": _scenario(values["scenario"])}
         known |= {name: int(values[name]) for name in ("iteration", "events")}
         if min(known["iteration"], known["events"]) < 0:
             raise ValueError("a branch before the beginning")
@@ -176,9 +172,8 @@ class Manifest:
                 f"recording format {texts.get('format')!r} is not {cls.FORMAT!r}; update brrt"
             )
         try:
-            contract = _contract(_json(texts.get("contract", "null")))
             return cls(
-                _with_former(_scenario(_json(texts["scenario"])), contract),
+                _scenario(_json(texts["scenario"])),
                 tuple(map(float, _json(texts["start"]))),
                 tuple(map(float, _json(texts["goal"]))),
                 int(texts["dim"]),
@@ -187,7 +182,7 @@ class Manifest:
                 dict(_json(texts["made_by"])),
                 texts.get("robot"),
                 _branches(texts),
-                contract,
+                _contract(_json(texts.get("contract", "null"))),
             )
         except KeyError as error:
             raise BrrtError(f"the manifest is damaged: it has no {error}") from None
@@ -217,17 +212,6 @@ def _scenario(values: Any) -> Scenario:
         if name not in values:
             raise BrrtError(f"the manifest is damaged: its scenario has no {name}")
     return scenario
-
-
-def _with_former(scenario: Scenario, contract: Contract | None) -> Scenario:
-    """Return a scenario of an earlier version with the defaults of its time, as if given."""
-    if scenario.planner not in ("a-star", "lrta-star"):
-        return scenario
-    # Recordings of today's defaults state None in their contract.
-    stated = {} if contract is None else contract.planner.settings
-    former = {name: stated.get(name, value) for name, value in _FORMER_LATTICE.items()}
-    missing = {k: v for k, v in former.items() if v is not None and k not in scenario.params}
-    return replace(scenario, params={**scenario.params, **missing}) if missing else scenario
 
 
 def _branches(texts: Mapping[str, str]) -> tuple[Branch, ...]:

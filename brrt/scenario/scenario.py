@@ -30,6 +30,11 @@ _MAX_BYTES = 1_000_000
 DEFAULT_ITERATIONS = 1_000_000
 """Iterations of a run without a budget, unless its planner has another default."""
 
+_FORMER_NAMES: Mapping[str, Mapping[str, str]] = {
+    planner: {"epsilon": "cell"} for planner in ("a-star", "lrta-star")
+}
+"""For each planner, former names of settings, still accepted, and what they are called now."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
@@ -98,6 +103,7 @@ class Scenario:
         for name in ("start", "goal"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _configuration(name, getattr(self, name)))
+        object.__setattr__(self, "params", _renamed(self.planner, self.params))
         object.__setattr__(self, "robot", _robot(self.robot))
         if self.clock not in ("real", "logical"):
             raise unknown("clock", self.clock, ("real", "logical"))
@@ -179,6 +185,19 @@ class Scenario:
             BrrtError: Its file cannot be read or is not a robot.
         """
         return make_robot(self.robot)
+
+
+def _renamed(planner: str, params: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return settings of a planner under the names that they have now.
+
+    Raises:
+        BrrtError: One is given under both names.
+    """
+    names = _FORMER_NAMES.get(planner, {})
+    for former, name in names.items():
+        if former in params and name in params:
+            raise BrrtError(f"{former} is the former name of {name}; give only {name}")
+    return {names.get(name, name): value for name, value in params.items()}
 
 
 def _robot(spec: str) -> str:

@@ -32,10 +32,10 @@ CASES: dict[str, tuple[list[str], str]] = {
                  "--planner rrt-connect"),
     "few iterations": (FEW_ITERATIONS, "--from run.mcap --iterations 30000"),
     "coarse cells": (["--world", "passage2d:gap=3", "--planner", "a-star",
-                      "--param", "epsilon=7.5"],
-                     "epsilon="),
+                      "--param", "cell=7.5"],
+                     "cell="),
     "much too coarse cells": (["--world", "passage2d:gap=0.2", "--planner", "a-star", "--param",
-                               "epsilon=7.5"], "--iterations"),
+                               "cell=7.5"], "--iterations"),
 }  # fmt: skip
 
 
@@ -189,7 +189,7 @@ def test_cells_near_the_goal_are_blocked(tmp_path: Path, brrt: Command) -> None:
     world = tmp_path / "near.json"
     World("near", np.zeros(2), np.full(2, 10.0), boxes=np.array(near)).save(world)
     out = tmp_path / "run.mcap"
-    options = ["--planner", "a-star", "--start", "1,1", "--goal", "6,6", "--param", "epsilon=2",
+    options = ["--planner", "a-star", "--start", "1,1", "--goal", "6,6", "--param", "cell=2",
                "--param", "max_move=1.42", "--out", str(out)]  # fmt: skip
     assert brrt("plan", "--world", str(world), *options).code == 1
     advice = explain(read(out)).as_dict()["advice"][0]

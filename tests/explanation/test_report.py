@@ -24,7 +24,7 @@ Command = Callable[..., Result]
 def test_it_fits_a_screen(brrt: Command) -> None:
     """80 columns, and at most 33 lines; from Python it is the same text."""
     for args in (["--world", "gap2d:gap=1", "--iterations", 2000],
-                 ["--planner", "lrta-star", "--world", "bugtrap2d", "--param", "epsilon=3"],
+                 ["--planner", "lrta-star", "--world", "bugtrap2d", "--param", "cell=3"],
                  ["--planner", "rrt-star", "--iterations", 2000]):  # fmt: skip
         brrt("plan", *args, "--out", "run.mcap", "--force")
         text = brrt("explain", "run.mcap").out
@@ -47,7 +47,7 @@ def test_bad_input_is_one_line(args: list[Any], message: str, brrt: Command) -> 
 
 def test_words_of_a_lattice_search() -> None:
     """A cell is entered once, not 1 times, and no tree grows."""
-    scenario = Scenario(world="empty2d", planner="lrta-star", params={"epsilon": 3}, iterations=20)
+    scenario = Scenario(world="empty2d", planner="lrta-star", params={"cell": 3}, iterations=20)
     found = explained(scenario)
     rows = dict(found.rows())
     assert rows["moves"] == "20; each cell was entered once"

@@ -191,7 +191,7 @@ def test_a_lattice_has_more_cells_than_the_log_has_events(diagonals: bool, tmp_p
     """Without obstacles an event shows many cells at once, and all are numbered."""
     scenario = Scenario(
         world="boxes3d:n=0", planner="a-star", start=(50, 50, 50), goal=(90, 89, 88),
-        params={"epsilon": 2.0, "diagonals": diagonals}, smooth=False,
+        params={"cell": 2.0, "diagonals": diagonals}, smooth=False,
     )  # fmt: skip
     run, memory = Run(scenario), Memory()
     run.execute([McapSink(tmp_path / "run.mcap", run.manifest, run.problem.world), memory])

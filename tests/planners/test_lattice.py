@@ -68,7 +68,7 @@ def twin_of(problem: Problem, planner: AStar | LRTAStar) -> Twin:
         return bool(is_free(problem.space, np.array([a, b])))
 
     grid = planner.resolved(problem)
-    options = {name: getattr(grid, name) for name in ("epsilon", "diagonals", "max_move")}
+    options = {name: getattr(grid, name) for name in ("cell", "diagonals", "max_move")}
     return Twin(problem.world, problem.start, problem.goal, free, **options)
 
 
@@ -107,7 +107,7 @@ def problems(draw: st.DrawFn, most: int = 7) -> Problem:
 
 LATTICES = st.fixed_dictionaries(
     {
-        "epsilon": st.sampled_from([0.4, 0.5, 1.0]),
+        "cell": st.sampled_from([0.4, 0.5, 1.0]),
         "diagonals": st.booleans(),
         "max_move": st.sampled_from([0.0, 0.5, 1.0, 2.5]),
     }
@@ -165,7 +165,7 @@ def check_paths(problem: Problem, planner: AStar | LRTAStar, events: Events) -> 
         steps = np.diff(q, axis=0)
         axes = (np.abs(steps) > 1e-9).sum(axis=1)
         grid = planner.resolved(problem)
-        cells = np.abs(steps) / grid.epsilon
+        cells = np.abs(steps) / grid.cell
         assert ((np.abs(cells - np.round(cells)) < 1e-9) & (cells < 1.5))[:-1].all()
         assert (axes[:-1] <= (problem.dof if grid.diagonals else 1)).all()
         if len(steps) and axes[-1] > 1 and not grid.diagonals:
@@ -284,9 +284,7 @@ def test_time_ends_a_run(planner: AStar | LRTAStar) -> None:
     boxes = np.array([[6.0, -1.0, 6.5, 11.0]])
     world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=boxes)
     problem = Problem(world, Point(), np.array([1.0, 5.0]), np.array([9.0, 5.0]))
-    events = planned(
-        replace(planner, epsilon=3e-5), problem, stop=Stop(iterations=10**9, time_s=0.05)
-    )
+    events = planned(replace(planner, cell=3e-5), problem, stop=Stop(iterations=10**9, time_s=0.05))
     assert status(events) is Status.TIME_LIMIT
     assert len(events[Kind.EXPAND]) > 10
 
@@ -296,7 +294,7 @@ def test_tables_grow(planner: AStar | LRTAStar, monkeypatch: pytest.MonkeyPatch)
     """Room for a few cells and moves at first changes nothing."""
     world = World("walled", np.zeros(2), np.full(2, 10.0), boxes=np.array([[5.0, 0, 6.0, 9.0]]))
     problem = Problem(world, Point(), np.array([1.0, 1.0]), np.array([9.0, 1.0]))
-    fine = replace(planner, epsilon=0.2)
+    fine = replace(planner, cell=0.2)
     whole = planned(fine, problem)
     assert len(whole[Kind.EXPAND]) > 300
     monkeypatch.setattr("brrt.planners.a_star._FIRST_ROOM", 1)
@@ -322,9 +320,9 @@ def test_walled_in(planner: AStar | LRTAStar) -> None:
     """A start without free neighbours is hopeless at once, and so is a closed room later."""
     walls = [[3.0, 3, 7, 4], [3, 6, 7, 7], [3, 3, 4, 7], [6, 3, 7, 7]]
     world = World("room", np.zeros(2), np.full(2, 10.0), boxes=np.array(walls))
-    for epsilon, cells in ((2.0, 1), (0.5, 9)):
+    for cell, cells in ((2.0, 1), (0.5, 9)):
         problem = Problem(world, Point(), np.array([5.0, 5.0]), np.array([1.0, 1.0]))
-        events = planned(replace(planner, epsilon=epsilon), problem)
+        events = planned(replace(planner, cell=cell), problem)
         assert status(events) is Status.NO_PATH
         assert not len(events[Kind.PATH])
         assert len(np.unique(events[Kind.EXPAND]["cell"])) == cells
@@ -339,17 +337,17 @@ def test_refuses_what_it_cannot_plan_for(planner: AStar | LRTAStar) -> None:
     poses = np.array([1.0, 1.0, 0.0]), np.array([9.0, 9.0, 0.0])
     with pytest.raises(BrrtError, match=r"move a point; use --robot point"):
         planned(planner, Problem(world, Polygon(length=0.5, width=0.5), *poses))
-    with pytest.raises(BrrtError, match=r"epsilon 1e-09 is too small for this world"):
-        planned(replace(planner, epsilon=1e-9), Problem(world, Point(), *ends))
+    with pytest.raises(BrrtError, match=r"cell 1e-09 is too small for this world"):
+        planned(replace(planner, cell=1e-9), Problem(world, Point(), *ends))
 
 
 def test_contract() -> None:
     """Their contracts."""
     world = World("empty", np.zeros(2), np.full(2, 10.0))
     problem = Problem(world, Point(), np.array([1.0, 1.0]), np.array([9.0, 9.0]))
-    grid = LRTAStar(epsilon=0.25, lookahead=3).contract(problem).lattice
+    grid = LRTAStar(cell=0.25, lookahead=3).contract(problem).lattice
     assert grid is not None
-    assert (grid.epsilon, grid.diagonals, grid.max_move, grid.lookahead) == (0.25, False, 1.0, 3)
+    assert (grid.cell, grid.diagonals, grid.max_move, grid.lookahead) == (0.25, False, 1.0, 3)
     grid = AStar(diagonals=True).contract(problem).lattice
     assert grid is not None
     assert (grid.diagonals, grid.lookahead) == (True, None)
@@ -415,7 +413,7 @@ def digest() -> str:
     problem = Problem(world, Point(), np.array([1.0, 1, 1]), np.array([4.0, 1, 1]))
     total = hashlib.sha256()
     for planner in (
-        LRTAStar(trials=2), LRTAStar(lookahead=7, diagonals=True, epsilon=1.0), AStar(),
+        LRTAStar(trials=2), LRTAStar(lookahead=7, diagonals=True, cell=1.0), AStar(),
     ):  # fmt: skip
         total.update(repr(emitted(planned(planner, problem))).encode())
     return total.hexdigest()
@@ -443,8 +441,8 @@ def test_a_goal_that_no_cell_is_near(planner: str) -> None:
         ("empty2d", 2.0, (5, 5), (10, 10), "1.41422"),
         ("empty2d", 60.0, (5, 5), (95, 95), "42.4265"),
     ]
-    for world, epsilon, start, goal, least in cases:
-        params = {"epsilon": epsilon, "diagonals": True}
+    for world, cell, start, goal, least in cases:
+        params = {"cell": cell, "diagonals": True, "max_move": 1.0}
         scenario = Scenario(world=world, planner=planner, params=params, start=start, goal=goal)
         with pytest.raises(BrrtError, match=f"max_move 1 is too small: .* at least {least}, or"):
             Run(scenario)
@@ -455,16 +453,16 @@ def test_a_goal_that_no_cell_is_near(planner: str) -> None:
 def test_default_cells() -> None:
     """Half a unit where that suits the map; a part of its side otherwise; cells of a grid map."""
     for size, edge in ((0.01, 5e-4), (1.0, 0.05), (10.0, 0.5), (100.0, 0.5), (1e5, 500.0)):
-        ends = {"start": (0.1 * size, 0.1 * size), "goal": (0.93 * size, 0.88 * size)}
+        ends: dict[str, Any] = {"start": (0.1 * size,) * 2, "goal": (0.93 * size, 0.88 * size)}
         for planner in ("a-star", "lrta-star"):
             run = Run(Scenario(world=f"empty2d:size={size:g}", planner=planner, **ends))
             lattice = (run.manifest.contract or Contract()).lattice
             assert lattice is not None
-            assert (lattice.epsilon, lattice.max_move) == pytest.approx((edge, 2 * edge))
+            assert (lattice.cell, lattice.max_move) == pytest.approx((edge, 2 * edge))
             assert not lattice.diagonals
             assert run.execute().solved
             chosen = (run.manifest.contract or Contract()).planner.chosen
-            assert chosen == {"epsilon": lattice.epsilon, "diagonals": False,
+            assert chosen == {"cell": lattice.cell, "diagonals": False,
                               "max_move": lattice.max_move}  # fmt: skip
     cells = np.zeros((6, 300), bool)
     cells[:5, 100] = True

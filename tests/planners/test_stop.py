@@ -25,8 +25,8 @@ ENDLESS: dict[str, dict[str, Any]] = {
     "bi-rrt": {"step": 1e-5, "grow": "connect", "link": "connect"},
     "rrt-star": {"step": 150.0, "gamma": 1e9},
     "bi-rrt-star": {"step": 150.0, "gamma": 1e9},
-    "lrta-star": {"epsilon": 1e-3, "lookahead": 10_000},
-    "a-star": {"epsilon": 1e-3},
+    "lrta-star": {"cell": 1e-3, "lookahead": 10_000},
+    "a-star": {"cell": 1e-3},
 }
 """Settings with which a single iteration, or the whole search, takes seconds or hours."""
 

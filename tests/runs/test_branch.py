@@ -307,8 +307,8 @@ def test_on_the_command_line(brrt: Callable[..., Result]) -> None:
         ("rrt", 5000, {}),
         ("rrt-star", 300, {}),
         ("bi-rrt-star", 300, {"stop_at_first": True}),
-        ("a-star", 9000, {"epsilon": 2.0}),
-        ("lrta-star", 9000, {"epsilon": 2.0, "trials": 2}),
+        ("a-star", 9000, {"cell": 2.0}),
+        ("lrta-star", 9000, {"cell": 2.0, "trials": 2}),
     ],
 )
 def test_what_follows_planning_can_change(

@@ -16,7 +16,7 @@ from tests.runs.test_branch import FEW, child, last_open, parent
 from tests.support import naive
 
 CAVE = Scenario(
-    world="circles2d:n=40,seed=2", planner="lrta-star", params={"epsilon": 2.0}, smooth=False,
+    world="circles2d:n=40,seed=2", planner="lrta-star", params={"cell": 2.0}, smooth=False,
     clock="logical",
 )  # fmt: skip
 
@@ -26,7 +26,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
     """Draw a search on a coarse lattice, so that it ends soon."""
     planner = draw(st.sampled_from(["a-star", "lrta-star"]))
     params: dict[str, Any] = {
-        "epsilon": draw(st.sampled_from([2.0, 3.6])),
+        "cell": draw(st.sampled_from([2.0, 3.6])),
         "diagonals": draw(st.booleans()),
         "max_move": draw(st.sampled_from([0.0, 5.0])),
     }
@@ -117,7 +117,7 @@ def test_another_lookahead_plans_anew() -> None:
 def test_refusals() -> None:
     """The lattice cannot change; nothing follows an optimal path or a proof."""
     recording, _ = parent(CAVE)
-    for name, value in {"epsilon": 1.0, "diagonals": True, "max_move": 9.0}.items():
+    for name, value in {"cell": 1.0, "diagonals": True, "max_move": 9.0}.items():
         with pytest.raises(
             BrrtError, match=f"{name} cannot change to {value} at a branch: the lattice"
         ):
@@ -125,7 +125,7 @@ def test_refusals() -> None:
     shortest, _ = parent(replace(CAVE, planner="a-star"))
     with pytest.raises(BrrtError, match=r"ended with its path at .* \(--at-iteration\)$"):
         BranchedRun(shortest)
-    coarse = {"epsilon": 7.5}
+    coarse = {"cell": 7.5}
     hopeless = replace(CAVE, world="passage2d:gap=3", params=coarse)
     recording, log = parent(hopeless)
     assert status(log) is Status.NO_PATH

@@ -6,11 +6,18 @@ from typing import Any
 
 import pytest
 
-from brrt import Recording, Run, Scenario, reproduce, verify
+from brrt import BrrtError, Recording, Run, Scenario, reproduce, verify
 from brrt.planners import make_planner, state_contract
 from brrt.runs.branch import BranchedRun
 from brrt.scenario.contract import Contract
-from brrt.scenario.contracts import as_planned, changes_of, contract_differences, contract_of
+from brrt.scenario.contracts import (
+    as_planned,
+    changes_of,
+    contract_differences,
+    contract_of,
+    planner_settings,
+)
+from brrt.scenario.manifest import Manifest
 
 DENSE = Scenario(
     world="circles2d:n=200,seed=1", planner="rrt-star", iterations=400, seed=3, smooth=False
@@ -83,6 +90,38 @@ def test_its_branches(planner: str, *, stated: bool) -> None:
         again = BranchedRun(branched, iteration=500, params={"informed": True}).record()
         assert (again.manifest.contract or Contract()).step == step
         assert reproduce(again).equal
+
+
+@pytest.mark.parametrize("planner", ["a-star", "lrta-star"])
+def test_cells_that_are_not_the_default_today(planner: str) -> None:
+    """A recording without a contract had cells of 0.5, faces alone, and moves of 1 to the goal."""
+    former_defaults = {"cell": 0.5, "diagonals": False, "max_move": 1.0}
+    scenario = Scenario(world="empty2d:size=3", planner=planner, start=(1, 1), goal=(2.2, 2.9))
+    run = Run(replace(scenario, params=former_defaults))
+    recording = run.record()
+    manifest = replace(recording.manifest, scenario=scenario, contract=None)
+    recording = replace(recording, manifest=manifest)
+    assert (Run(scenario).manifest.contract or Contract()).cell == pytest.approx(0.15)
+    made, known = run.manifest.contract or Contract(), contract_of(manifest, recording.world)
+    assert known.lattice == made.lattice
+    assert known.planner.chosen == former_defaults
+    assert planner_settings(manifest)[0].items() >= former_defaults.items()
+    assert reproduce(recording).equal
+    assert verify(recording).holds
+
+
+@pytest.mark.parametrize("planner", ["a-star", "lrta-star"])
+def test_the_former_name_of_cells(planner: str) -> None:
+    """Settings and contracts that name them `epsilon` are read as those that name them `cell`."""
+    run = Run(Scenario(planner=planner, params={"epsilon": 2.0}, iterations=50))
+    assert run.manifest.scenario.params == {"cell": 2.0}
+    texts = run.manifest.to_strings()
+    assert "epsilon" not in str(texts)
+    texts = {name: text.replace('"cell"', '"epsilon"') for name, text in texts.items()}
+    assert Manifest.from_strings(texts) == run.manifest
+    with pytest.raises(BrrtError, match="epsilon is the former name of cell; give only cell"):
+        Scenario(planner=planner, params={"epsilon": 2.0, "cell": 1.0})
+    assert Scenario(planner="another", params={"epsilon": 2.0}).params == {"epsilon": 2.0}
 
 
 def test_given_settings_stay() -> None:

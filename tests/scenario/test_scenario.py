@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -75,8 +75,9 @@ def test_numbers_that_are_refused(message: str) -> None:
 def test_every_parameter_has_bounds(kind: str) -> None:
     """Numbers that would overflow, or be 0 once squared, are refused; those at the bounds not."""
     settings = ROBOTS[kind.split()[1]] if kind.startswith("robot") else PLANNERS[kind]
+    hints = get_type_hints(settings)
     for name, default in settings().as_dict().items():
-        if isinstance(default, bool | str):
+        if isinstance(default, bool | str) or bool in get_args(hints[name]):
             continue
         for far in (1e151, -1e151, 10**400, -(10**200), "1e30000", float("nan")):
             with pytest.raises(BrrtError, match=f"^{name} must be ") as raised:

@@ -171,7 +171,7 @@ def run_of(**given: Any) -> Case:
     return _case(Run(Scenario(**({"clock": "logical", "world": "circles2d:n=40,seed=3"} | given))))
 
 
-_CELLS = {"epsilon": 4.0, "max_move": 6.0}
+_CELLS = {"cell": 4.0, "max_move": 6.0}
 _LATTICE = {"world": "circles2d:n=25,seed=3", "smooth": False}
 _STAR = {"planner": "rrt-star", "seed": 3, "iterations": 120}
 _PAIR = _STAR | {"planner": "bi-rrt-star", "params": {"step": 8, "connect_distance": 25}}

@@ -16,8 +16,8 @@ PLANNERS: dict[str, dict[str, Any]] = {
     "bi-rrt": {},
     "rrt-star": {"iterations": 2000},
     "bi-rrt-star": {"iterations": 1000},
-    "lrta-star": {"params": {"epsilon": 2.0, "lookahead": 3, "trials": 2}},
-    "a-star": {"params": {"epsilon": 2.0}},
+    "lrta-star": {"params": {"cell": 2.0, "lookahead": 3, "trials": 2}},
+    "a-star": {"params": {"cell": 2.0}},
 }
 
 

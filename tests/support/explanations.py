@@ -8,7 +8,7 @@ from tests.support.logs import recording
 
 GAP = Scenario(world="gap2d:gap=5", iterations=300, seed=4, clock="logical")
 TRAP = Scenario(
-    world="bugtrap2d", planner="lrta-star", params={"epsilon": 3}, iterations=800, clock="logical"
+    world="bugtrap2d", planner="lrta-star", params={"cell": 3}, iterations=800, clock="logical"
 )
 STAR = Scenario(
     world="circles2d:n=40,seed=3", planner="rrt-star", iterations=250, seed=7, clock="logical"

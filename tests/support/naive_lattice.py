@@ -21,10 +21,10 @@ class Twin:
 
     def __init__(
         self, world: World, start: Floats, goal: Floats, free: Callable[[Floats, Floats], bool],
-        *, epsilon: float = 0.5, diagonals: bool = False, max_move: float = 1.0,
+        *, cell: float = 0.5, diagonals: bool = False, max_move: float = 1.0,
     ) -> None:  # fmt: skip
         self.world, self.start, self.goal, self.free = world, start, goal, free
-        self.epsilon, self.max_move = epsilon, max_move
+        self.cell, self.max_move = cell, max_move
         self.steps: list[tuple[tuple[int, ...], float]] = []
         for along in range(1, world.dim + 1 if diagonals else 2):
             for axes in combinations(range(world.dim), along):
@@ -32,7 +32,7 @@ class Twin:
                     step = [0] * world.dim
                     for axis, sign in zip(axes, signs, strict=True):
                         step[axis] = sign
-                    self.steps.append((tuple(step), epsilon * math.sqrt(along)))
+                    self.steps.append((tuple(step), cell * math.sqrt(along)))
         self.number = {(0,) * world.dim: 0}
         self.at = [(0,) * world.dim]
         self.h = [self.straight(start)]
@@ -50,7 +50,7 @@ class Twin:
 
     def q(self, at: tuple[int, ...]) -> Floats:
         """Position of a cell."""
-        return self.start + self.epsilon * np.array(at)
+        return self.start + self.cell * np.array(at)
 
     def emit(self, kind: Kind, *fields: float, q: Floats) -> None:
         """Append an event."""

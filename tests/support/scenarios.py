@@ -191,8 +191,8 @@ def _params(rng: np.random.Generator, planner: str) -> dict[str, Any]:  # noqa: 
         return values[int(rng.integers(len(values)))]
 
     if planner in SEARCHES:
-        found = {"epsilon": pick(0.5, 1.0, 3.7)}
-        found["max_move"] = found["epsilon"] * pick(2.0, 2.0, 5.0)
+        found = {"cell": pick(0.5, 1.0, 3.7)}
+        found["max_move"] = found["cell"] * pick(2.0, 2.0, 5.0)
         found["diagonals"] = pick(True, False)
         if planner == "lrta-star":
             found |= {"lookahead": pick(1, 1, 4, 30), "trials": pick(1, 1, 3)}

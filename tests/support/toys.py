@@ -155,11 +155,11 @@ class Pair:
 class Walk:
     """LRTA* with a lookahead of 1 on a lattice; it walks `trials` times."""
 
-    epsilon, max_move, trials = 10.0, 10.0, 2
+    edge, max_move, trials = 10.0, 10.0, 2
 
     def contract(self, problem: Problem) -> Contract:
         """A lattice without diagonals."""
-        return Contract(lattice=Lattice(self.epsilon, False, self.max_move, 1))
+        return Contract(lattice=Lattice(self.edge, False, self.max_move, 1))
 
     def solve(  # noqa: C901 - a paragraph of a paper, in one piece
         self, problem: Problem, rng: np.random.Generator, log: EventLog, stop: Stop
@@ -172,7 +172,7 @@ class Walk:
         looked: set[tuple[int, ...]] = set()
 
         def place(cell: tuple[int, ...]) -> Floats:
-            return problem.start + self.epsilon * np.array(cell)
+            return problem.start + self.edge * np.array(cell)
 
         def estimate(cell: tuple[int, ...]) -> float:
             return h.get(cell, far(place(cell), goal))
@@ -190,7 +190,7 @@ class Walk:
                 for delta in steps if not arrives else []:
                     other = tuple(x + d for x, d in zip(cell, delta, strict=True))
                     if free(problem, here, place(other)):
-                        choices.append((self.epsilon + estimate(other), other))
+                        choices.append((self.edge + estimate(other), other))
                     elif cell not in looked:
                         q, world = place(other), problem.world
                         beyond = ((q < world.lower) | (world.upper < q)).any()
@@ -205,7 +205,7 @@ class Walk:
                     cell = cell_next
                 moves, step = moves + 1, step + 1
                 target = goal if arrives else place(cell)
-                cost += far(here, target) if arrives else self.epsilon
+                cost += far(here, target) if arrives else self.edge
                 log.emit(
                     Kind.MOVE, moves, trial=trial, step=step, cost=cost, q=target,
                     cell=-1 if arrives else numbers.setdefault(cell, len(numbers)),

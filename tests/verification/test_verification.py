@@ -230,7 +230,7 @@ def test_trees_whose_start_is_the_goal(planner: str, smooth: bool) -> None:
 @pytest.mark.parametrize("params", [{}, {"lookahead": 5}, {"trials": 3}])
 def test_robots_whose_start_is_the_goal(params: dict[str, object]) -> None:
     """Each trial expands a cell and reports its path on arrival; a missing path is found."""
-    case = run_of(**HOME, planner="lrta-star", params=params | {"epsilon": 4.0})
+    case = run_of(**HOME, planner="lrta-star", params=params | {"cell": 4.0})
     assert case.broken() == set()
     raw = case.log[Kind.PATH]["stage"] == Stage.RAW
     assert len(case.log[Kind.EXPAND]) == raw.sum() == params.get("trials", 1)
@@ -240,7 +240,7 @@ def test_robots_whose_start_is_the_goal(params: dict[str, object]) -> None:
 
 def test_a_search_whose_start_is_the_goal() -> None:
     """The first cell is the goal."""
-    case = run_of(**HOME, planner="a-star", params={"epsilon": 4.0})
+    case = run_of(**HOME, planner="a-star", params={"cell": 4.0})
     assert case.broken() == set()
     assert len(case.log[Kind.EXPAND]) == 1
     assert case.drop(Kind.PATH, 0).broken() == {"outcome", "smoothed"}

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not NAMES, reason="no course maps here")
 def driven(name: str, planner: str) -> tuple[Run, Memory, dict[str, object]]:
     """Plan and execute a course map as the published run did."""
     start, goal = json.loads(QUERIES.read_text())["queries"][name]
-    classic = {"epsilon": CELL, "diagonals": False, "lookahead": 1}
+    classic = {"cell": CELL, "diagonals": False, "lookahead": 1}
     run, memory = Run(
         Scenario(
             world=str(MAPS / f"{name}.txt"), start=tuple(start), goal=tuple(goal), planner=planner,

@@ -82,7 +82,7 @@ class MoveLengths(MoveRule):
         context, lattice = self.context, self.context.contract.lattice
         length, limit = context.distance(before, table["q"]), np.full(len(table), np.inf)
         if lattice is not None:
-            diagonal = lattice.epsilon * (np.sqrt(context.world.dim) if lattice.diagonals else 1.0)
+            diagonal = lattice.cell * (np.sqrt(context.world.dim) if lattice.diagonals else 1.0)
             limit[:] = max(lattice.max_move, diagonal)
         limit[_along_path(context, table)] = context.manifest.scenario.max_move
         self.judge(

@@ -123,7 +123,7 @@ class MarkerStreams:
         scale = float(self._robot.distance(*ends)) or 1.0
         colours = np.ones((len(cell), 4), np.float32)
         colours[:, :3] = heat(values / (values + scale)) / 255
-        edge = contract.epsilon or _CELL * world.extent
+        edge = contract.cell or _CELL * world.extent
         edge *= _CUBE[world.dim]
         size = (edge, edge, 1e-6 * world.extent if world.dim == 2 else edge)
         cubes = partial(Marker, MarkerType.CUBES, TRACE, size, z=GROUND * world.extent)

@@ -204,7 +204,7 @@ class TreePanel:
 
     @property
     def _edge(self) -> float:
-        return self.playback.contract.epsilon or 1.0
+        return self.playback.contract.cell or 1.0
 
     @property
     def heat(self) -> tuple[Any, str] | None:

@@ -24,7 +24,7 @@ _LARGEST = 1 << 40
 
 def indices(context: Context, lattice: Lattice, q: Any) -> Ints:
     """Return the integer coordinates of the cells nearest to configurations, shape (n, d)."""
-    cells = np.rint((np.asarray(q) - context.start) / lattice.epsilon)
+    cells = np.rint((np.asarray(q) - context.start) / lattice.cell)
     return np.where(np.abs(cells) < _LARGEST, cells, _LARGEST).astype(np.int64)
 
 
@@ -54,10 +54,10 @@ class CellsOnLattice(Rule):
 
     def _judge(self, lattice: Lattice, table: Table) -> None:
         context, q = self.context, np.asarray(table["q"])
-        centre = context.start + lattice.epsilon * indices(context, lattice, q)
+        centre = context.start + lattice.cell * indices(context, lattice, q)
         off = np.abs(q - centre).max(axis=1, initial=0)
         self.judge(
-            table, ~(off <= CLOSE * lattice.epsilon + context.tolerance),
+            table, ~(off <= CLOSE * lattice.cell + context.tolerance),
             lambda i: f"cell {table['cell'][i]} is {off[i]:.3g} off the lattice",
         )  # fmt: skip
 
@@ -162,7 +162,7 @@ class Expansions(LatticeRule):
         idle = np.diff(moved + arrived, prepend=-1) == 0
         idle &= np.diff(context.stretch(begins), prepend=0) == 0
         self.judge(
-            begins, ~(off <= CLOSE * lattice.epsilon + context.tolerance) | idle,
+            begins, ~(off <= CLOSE * lattice.cell + context.tolerance) | idle,
             lambda i: (
                 f"another search from cell {begins['cell'][i]} without a move" if idle[i]
                 else f"a search from {vector(begins['q'][i])}; the robot is at {vector(q[i])}"
@@ -240,8 +240,8 @@ class EstimatesAdmissible(Rule):
             if not len(way) or (way[-1] != context.goal).any():
                 continue
             cells = indices(context, lattice, way)
-            off = np.abs(context.start + lattice.epsilon * cells - way).max(axis=1)
-            at_cell = off <= CLOSE * lattice.epsilon + context.tolerance
+            off = np.abs(context.start + lattice.cell * cells - way).max(axis=1)
+            at_cell = off <= CLOSE * lattice.cell + context.tolerance
             lengths = context.distance(way[:-1], way[1:])
             left = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
             for cell, cost in zip(cells[at_cell].tolist(), left[at_cell].tolist(), strict=True):

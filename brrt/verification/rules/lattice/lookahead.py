@@ -131,7 +131,7 @@ class _EstimateHistory:
 
     def before(self, cells: Ints, seq: Ints) -> Floats:
         """Return the estimates of cells, shape (n, d), before events, shape (n,)."""
-        q = self._context.start + self._lattice.epsilon * cells
+        q = self._context.start + self._lattice.cell * cells
         h = self._context.distance(q, self._context.goal[None])
         if len(self._keys):
             keys = cell_keys(cells)
@@ -168,7 +168,7 @@ class _Around(NamedTuple):
         blocked = np.unique(motion_keys(rejects["node"].astype(np.int64), targets))
         numbers = np.repeat(table["cell"].astype(np.int64), len(steps))
         is_blocked = contains(blocked, motion_keys(numbers, keys)).reshape(len(table), -1)
-        lengths = lattice.epsilon * np.sqrt([sum(map(abs, step)) for step in steps])
+        lengths = lattice.cell * np.sqrt([sum(map(abs, step)) for step in steps])
         costs = np.where(is_blocked, np.inf, lengths)
         return cls(cells, keys.reshape(costs.shape), costs)
 

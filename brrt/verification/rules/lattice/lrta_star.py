@@ -105,7 +105,7 @@ class _Learner:
     def _estimate(self, place: Cell) -> float:
         """Return the estimate of the cost-to-go, which begins as the distance."""
         if place not in self._h:
-            q = self._context.start + self._lattice.epsilon * np.array(place)
+            q = self._context.start + self._lattice.cell * np.array(place)
             self._h[place] = float(self._context.distance(q[None], self._context.goal[None])[0])
         return self._h[place]
 
@@ -119,7 +119,7 @@ class _Learner:
         if target in blocked:
             return f"a move to {list(target)}, which is blocked"
         costs = {
-            other: self._lattice.epsilon * sum(map(abs, step)) ** 0.5 + self._estimate(other)
+            other: self._lattice.cell * sum(map(abs, step)) ** 0.5 + self._estimate(other)
             for step in self._steps
             if (other := tuple(x + s for x, s in zip(place, step, strict=True))) not in blocked
         }

@@ -131,7 +131,7 @@ class ShortestPaths(LatticeRule):
         for step in steps_of(lattice, self.context.dof):
             other, is_free = cells.neighbours(step)
             exists = is_free & (other >= 0) & (cells.born[other] < cells.born)
-            through = cost[other] + lattice.epsilon * sum(map(abs, step)) ** 0.5
+            through = cost[other] + lattice.cell * sum(map(abs, step)) ** 0.5
             least = np.where(exists, np.minimum(least, through), least)
         order = cells.in_order()
         first, cost, least = cells.table[order], cost[order], least[order]
@@ -172,10 +172,10 @@ class CellNeighbours(LatticeRule):
         again = np.ones(len(rejects), bool)
         again[np.unique(motions, return_index=True)[1]] = False
         last = np.searchsorted(table["seq"], rejects["seq"]) - 1
-        off = np.abs(rejects["q"] - context.start - lattice.epsilon * targets)
+        off = np.abs(rejects["q"] - context.start - lattice.cell * targets)
         wrong = again | (last < 0) | (table["cell"][last] != rejects["node"])
         wrong |= ~adjacent(lattice, cells[last], targets)
-        wrong |= ~(off.max(axis=1, initial=0) <= CLOSE * lattice.epsilon + context.tolerance)
+        wrong |= ~(off.max(axis=1, initial=0) <= CLOSE * lattice.cell + context.tolerance)
         self.judge(
             rejects, wrong,
             lambda i: (
@@ -202,7 +202,7 @@ class CellNeighbours(LatticeRule):
         table = np.repeat(table, len(steps))
         keys = motion_keys(table["cell"].astype(np.int64), cell_keys(around))
         rest = ~contains(blocked, keys)
-        table, to = table[rest], context.start + lattice.epsilon * around[rest]
+        table, to = table[rest], context.start + lattice.cell * around[rest]
         low, high = context.lower - context.tolerance, context.upper + context.tolerance
         out = ~((low <= to) & (to <= high)).all(axis=1)
         self.judge(
@@ -249,8 +249,8 @@ class GoalReached(LatticeRule):
                 continue
             last = path[-2:]
             cells, far = indices(context, lattice, last), context.distance(last[:1], last[1:])
-            off = np.abs(context.start + lattice.epsilon * cells - last).max()
-            along = off <= CLOSE * lattice.epsilon + context.tolerance
+            off = np.abs(context.start + lattice.cell * cells - last).max()
+            along = off <= CLOSE * lattice.cell + context.tolerance
             along &= adjacent(lattice, cells[:1], cells[1:]).all()
             right = along or context.at_most(far, lattice.max_move).all()
             wrong = f"the motion to the goal is {far[0]:.9g} long, not {lattice.max_move:g} at most"

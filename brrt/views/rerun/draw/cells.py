@@ -40,7 +40,7 @@ class CellsDrawing:
     def __init__(self, canvas: Canvas, nodes: dict[int, DrawnNodes], manifest: Manifest) -> None:
         self._canvas, self._nodes = canvas, nodes
         contract = contract_of(manifest, canvas.frame.world)
-        self._edge, self._learns = contract.epsilon * canvas.frame.scale, contract.learns
+        self._edge, self._learns = contract.cell * canvas.frame.scale, contract.learns
         radius = self._edge * _RADIUS[canvas.dim]
         fine = radius < _SMALLEST * canvas.world.extent
         self._radius = _DOT[canvas.dim] if fine else radius

@@ -116,7 +116,7 @@ class MovesDrawing:
 
     def __init__(self, canvas: Canvas, manifest: Manifest) -> None:
         self._canvas = canvas
-        self._edge = edge = contract_of(manifest, canvas.frame.world).epsilon * canvas.frame.scale
+        self._edge = edge = contract_of(manifest, canvas.frame.world).cell * canvas.frame.scale
         limits = _MOVES_IN_3D if edge and canvas.dim > 2 else ()
         self._decimation = Decimation(canvas.world, *limits)
         self._start = canvas.places([manifest.start])

@@ -65,7 +65,7 @@ DOCTORED: list[Doctored] = [
     ("estimates", "", on("walk", too_low), {"choices"}),
     ("estimates", "after", lambda: altered(doubled, "lrta-star", Kind.HEURISTIC, 2), SEARCH),
     ("estimates admissible", "", on("walk", too_high), {"choices"}),
-    ("lattice moves", "", on("walk", lambda c: c.judged_by("lattice", epsilon=5.0)), {"choices",
+    ("lattice moves", "", on("walk", lambda c: c.judged_by("lattice", cell=5.0)), {"choices",
      "neighbours"}),
 ]  # fmt: skip
 

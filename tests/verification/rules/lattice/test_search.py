@@ -95,7 +95,7 @@ def test_clean_runs_are_not_accused(name: str) -> None:
 
 def test_no_path_is_proved() -> None:
     """Cells so large that none leads through a passage."""
-    params = {"epsilon": 7.5}
+    params = {"cell": 7.5}
     case = run_of(world="passage2d:gap=3", planner="a-star", smooth=False, params=params)
     results = {each.rule: each for each in verify(case.recording()).results}
     assert case.log[Kind.PHASE]["status"][-1] == Status.NO_PATH

@@ -41,7 +41,7 @@ def test_cells(planner: str, tmp_path: Path) -> None:
 def test_search_in_3d(tmp_path: Path) -> None:
     """Each part of the world that was searched has one cell, so that one sees through them."""
     path, world = tmp_path / "run.rrd", "boxes3d:size=30,n=5,min_side=2,max_side=4,seed=2"
-    log = drawn(path, Scenario(planner="a-star", world=world, params={"epsilon": 0.75}))
+    log = drawn(path, Scenario(planner="a-star", world=world, params={"cell": 0.75}))
     dots = np.array(items_of(path, CELLS_ENTITY, ":positions"))
     cells = log[Kind.EXPAND]["q"]
 
