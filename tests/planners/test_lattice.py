@@ -347,7 +347,7 @@ def test_contract() -> None:
     problem = Problem(world, Point(), np.array([1.0, 1.0]), np.array([9.0, 9.0]))
     grid = LRTAStar(cell=0.25, lookahead=3).contract(problem).lattice
     assert grid is not None
-    assert (grid.cell, grid.diagonals, grid.max_move, grid.lookahead) == (0.25, False, 1.0, 3)
+    assert (grid.cell, grid.diagonals, grid.max_move, grid.lookahead) == (0.25, False, 0.5, 3)
     grid = AStar(diagonals=True).contract(problem).lattice
     assert grid is not None
     assert (grid.diagonals, grid.lookahead) == (True, None)

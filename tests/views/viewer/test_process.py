@@ -6,7 +6,7 @@ import socket
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -96,11 +96,10 @@ def test_no_viewer_but_something_else(answer: bytes, monkeypatch: pytest.MonkeyP
 
 
 def _answer(server: socket.socket, answer: bytes) -> None:
-    held = []
-    while True:
-        try:
-            connection, _ = server.accept()
-        except OSError:
-            return
-        connection.sendall(answer)
-        held.append(connection)
+    with ExitStack() as held:
+        while True:
+            try:
+                connection, _ = server.accept()
+            except OSError:
+                return
+            held.enter_context(connection).sendall(answer)
