@@ -1,5 +1,6 @@
 """Errors that brrt raises for bad input and unusable files."""
 
+import math
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -49,3 +50,13 @@ def unknown(what: str, name: str, known: Iterable[str]) -> BrrtError:
     else:
         hint = f"choose from: {', '.join(names)}" if names else f"there is no {what}"
     return BrrtError(f"unknown {what} {name!r}; {hint}")
+
+
+def address_space() -> float:
+    """Return how many bytes the process may map (`ulimit -v`), infinity without a limit."""
+    try:
+        import resource  # noqa: PLC0415 - POSIX alone has it
+    except ImportError:
+        return math.inf
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return math.inf if limit == resource.RLIM_INFINITY else limit

@@ -1,5 +1,6 @@
 """The `brrt` command: the table of its commands, and errors as one line."""
 
+import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
@@ -128,12 +129,22 @@ def _run(args: Sequence[str] | None) -> int:
         from brrt.errors import BrrtError
         from brrt.output_names import TakenError
 
-        if isinstance(error, BrrtError | OSError):
+        if _short_of_memory(error):
+            complain("the memory does not suffice; free some, or use a smaller world or budget")
+        elif isinstance(error, BrrtError | OSError):
             for each in (error, error.__context__):  # where both files of a run have another name
                 if each is error or isinstance(each, TakenError):
                     complain(str(each))
-        elif isinstance(error, MemoryError):
-            complain("the memory does not suffice; free some, or use a smaller world or budget")
         else:
             print_exception(error)  # Python would end with code 1, which says "no path"
     return Code.BAD_INPUT
+
+
+def _short_of_memory(error: Exception) -> bool:
+    """Whether an allocation failed, or under a limit what fails when libraries are not mapped."""
+    if isinstance(error, MemoryError) or str(error) == "can't start new thread":
+        return True
+    from brrt.errors import address_space
+
+    library = isinstance(error, ImportError) or "shared object" in str(error)
+    return library and math.isfinite(address_space())

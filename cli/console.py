@@ -61,7 +61,10 @@ def note(message: str) -> None:
 
 def _print_on_stderr(text: str, style: str) -> None:
     shown = visible(f"brrt: {text}", one_line=True)
-    console(stderr=True).print(shown, style=style, markup=False, soft_wrap=True)
+    try:
+        console(stderr=True).print(shown, style=style, markup=False, soft_wrap=True)
+    except MemoryError:  # of a process that is about to say so
+        sys.stderr.write(f"{shown}\n")
 
 
 def announce_compilation() -> None:

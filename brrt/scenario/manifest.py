@@ -3,7 +3,7 @@
 import hashlib
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.metadata import version
@@ -13,6 +13,9 @@ from brrt.errors import BrrtError
 from brrt.robots import ROBOTS, Robot, mark_robot_file, names_robot_file, robot_from_json
 from brrt.scenario.contract import Contract
 from brrt.scenario.scenario import Scenario
+
+MOST_BRANCHES = 1000
+"""Of a run: reading, judging and printing a recording takes time for each of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +103,9 @@ class Manifest:
         """Check that the robot is stated: no file that a recording names is ever opened.
 
         Raises:
-            BrrtError: It is not, and the scenario names a file.
+            BrrtError: It is not, and the scenario names a file, or there are too many branches.
         """
+        _check_count(self.branches)
         if self.robot is None and names_robot_file(self.scenario.robot):
             raise BrrtError(
                 f"the manifest has no robot, and its scenario names the file "
@@ -216,9 +220,18 @@ def _scenario(values: Any) -> Scenario:
 
 def _branches(texts: Mapping[str, str]) -> tuple[Branch, ...]:
     branches = _json(texts.get("branches", "[]"))
+    _check_count(branches)
     contracts = _json(texts.get("branch_contracts", "null")) or [None] * len(branches)
     pairs = zip(branches, contracts, strict=True)
     return tuple(Branch.parse(branch, _contract(contract)) for branch, contract in pairs)
+
+
+def _check_count(branches: Sequence[Any]) -> None:
+    if len(branches) > MOST_BRANCHES:
+        raise BrrtError(
+            f"the run has {len(branches):,} branches, and may have at most {MOST_BRANCHES:,}; "
+            "plan one run with the settings of the last branch"
+        )
 
 
 def _contract(values: Any) -> Contract | None:
