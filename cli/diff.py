@@ -7,6 +7,7 @@ import typer
 
 from .console import Code, print_json, print_lines
 from .options import Json, Partial
+from .progress import ProgressBar
 
 
 def diff(
@@ -30,7 +31,9 @@ def diff(
 
     from .run_file import open_run
 
-    found = compare(*(open_run(run, partial=partial) for run in (a, b)), names=(str(a), str(b)))
+    runs = [open_run(run, partial=partial) for run in (a, b)]
+    with ProgressBar(None, "comparing").running():
+        found = compare(*runs, names=(str(a), str(b)))
     if as_json:
         print_json(found.as_dict())
     else:

@@ -6,6 +6,7 @@ import typer
 
 from .console import print_json, print_line, print_lines
 from .options import Accepted, At, AtEvent, AtIteration, Run, instant
+from .progress import ProgressBar
 
 
 def explain(
@@ -35,7 +36,8 @@ def explain(
     from .run_file import open_run
 
     limits = instant(at, at_event, at_iteration)
-    found = explained(Snapshot(open_run(run, limits, partial=True), limits), str(run))
+    with ProgressBar(None, "explaining").running():
+        found = explained(Snapshot(open_run(run, limits, partial=True), limits), str(run))
     if as_json:
         print_json(found.as_dict())
         return

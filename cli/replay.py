@@ -82,7 +82,7 @@ def replay(
         node_and_more=node is not None and bool(text or check or rrd),
     )
     limits = instant(at, at_event, at_iteration)
-    recording = open_run(run, limits, partial=partial or check is None)
+    recording = open_run(run, limits, partial=partial or check is None, watched=not text)
     if node is not None:
         from .node import print_node, tree_number
 

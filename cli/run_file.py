@@ -1,6 +1,7 @@
 """Recordings as commands open them: complete files, and cut or damaged ones up to the fault."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,12 @@ from brrt.replay.text import counted
 from brrt.shell import file_argument
 
 from .console import note
+from .progress import ProgressBar
 
 
-def open_run(path: Path, limits: Mapping[str, int] | None = None, *, partial: bool) -> Recording:
+def open_run(
+    path: Path, limits: Mapping[str, int] | None = None, *, partial: bool, watched: bool = True
+) -> Recording:
     """Open a recording for a command.
 
     Args:
@@ -22,6 +26,7 @@ def open_run(path: Path, limits: Mapping[str, int] | None = None, *, partial: bo
         limits: The instant that the user asks for, as `Events.until` takes it. If the recording
             ends earlier, a line on stderr reports where.
         partial: Take a cut or damaged file up to the fault, and report that once on stderr.
+        watched: Show a progress bar while batches are read; not where each is printed at once.
 
     Returns:
         The recording; reading its batches raises `RecordingError` at a fault unless `partial`.
@@ -33,7 +38,8 @@ def open_run(path: Path, limits: Mapping[str, int] | None = None, *, partial: bo
     if partial:
         whole = read(path, partial=True)
         recording = replace(recording, result=whole.result, counts=whole.counts)
-    return replace(recording, batches=_Batches(recording, limits or {}, partial=partial))
+    batches = _Batches(recording, limits or {}, partial=partial, watched=watched)
+    return replace(recording, batches=batches)
 
 
 class _Batches:
@@ -43,18 +49,26 @@ class _Batches:
         recording: The recording.
         limits: The instant that the user asks for.
         partial: Whether to report a fault; otherwise it is raised with the remedy.
+        watched: Whether to show a progress bar.
     """
 
-    def __init__(self, recording: Recording, limits: Mapping[str, int], *, partial: bool) -> None:
+    def __init__(
+        self, recording: Recording, limits: Mapping[str, int], *, partial: bool, watched: bool
+    ) -> None:
         self._batches, self._limits, self._partial = recording.batches, limits, partial
+        self._title, self._watched = f"reading {recording.name}", watched
+        self._total = sum(recording.counts.values()) if recording.counts else None
         self._reported = False
 
     def __call__(self) -> Iterator[Events]:
         count, last = 0, Instant(0, 0)
         try:
-            for batch in self._batches():
-                count, last = count + len(batch), batch.last if len(batch) else last
-                yield batch
+            bar = ProgressBar(self._total, self._title)
+            with bar.running() if self._watched else nullcontext():
+                for batch in self._batches():
+                    count, last = count + len(batch), batch.last if len(batch) else last
+                    yield batch
+                    bar.update(count, self._title, counted(count, "event"))
         except BrokenError as error:
             if not self._partial:
                 raise RecordingError(refusal(error, count, last)) from None

@@ -73,7 +73,8 @@ def verify(
     recording = open_run(run, partial=partial)
     if partial and _lacks_events(recording):
         recording = replace(recording, result=None)
-    found = verify(recording)
+    with ProgressBar(None, "judging").running():
+        found = verify(recording)
     again = _reproduced(recording, tolerance) if rerun else None
     _note_differences(recording)
     if as_json:

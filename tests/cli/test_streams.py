@@ -58,33 +58,6 @@ def test_frames_without_utf8(command: str, bash: Bash) -> None:
     assert done.stdout.isascii()
 
 
-def test_progress_bar_without_utf8(tmp_path: Path) -> None:
-    """The bar appears after a second."""
-    code = (
-        "import time\n"
-        "from brrt_cli.streams import robust_streams\n"
-        "from brrt_cli.progress import ProgressBar\n"
-        "with robust_streams(), ProgressBar(3, 'waiting').running() as bar:\n"
-        "    time.sleep(1.3)\n"
-        "    bar.update(1, 'planning \\xb7 y', '')\n"
-        "    time.sleep(0.2)\n"
-    )
-    terminal, end = os.openpty()
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        stderr=end,
-        env={**os.environ, **ENCODINGS["C"], "TERM": "xterm"},
-        timeout=60,
-        check=False,
-    )
-    os.close(end)
-    shown = os.read(terminal, 65536)
-    os.close(terminal)
-    assert done.returncode == 0
-    assert shown.isascii()
-    assert b"planning - y" in shown
-
-
 @FULL
 @pytest.mark.parametrize("command", [f"{PLAN} --json", "planners", "--help"])
 def test_full_stdout(command: str, bash: Bash) -> None:
@@ -139,3 +112,43 @@ def test_names_that_are_not_text(name: str, brrt: Command) -> None:
         done = brrt(*args)
         assert done.code == 0, done.err
     assert brrt("replay", mcap, "--json").json["world"] == world
+
+
+def test_limited_address_space(bash: Bash, tmp_path: Path) -> None:
+    """Rerun would abort; one line says how much it needs."""
+    assert bash(f"brrt {PLAN.replace('--no-record', '--out run.mcap')}").returncode == 0
+    for command in ("replay run.mcap --rrd run.rrd", "plan --rrd run.rrd"):
+        done = bash(f"ulimit -v 1500000; brrt {command}", OPENBLAS_NUM_THREADS="1")
+        assert done.returncode == 2
+        assert done.stderr.count(b"\n") == 1
+        assert b"needs 3,000,000 kB of address space, and `ulimit -v` allows 1,5" in done.stderr
+    assert not (tmp_path / "run.rrd").exists()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        RuntimeError("can't start new thread"),
+        ImportError("a.so: failed to map segment from shared object"),
+        OSError("Could not find/load shared object file 'a.so'"),
+    ],
+)
+def test_memory_that_runs_out(
+    error: Exception, brrt: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line, also where none is left to lay it out, and exit code 2."""
+
+    def failing(*_: object, **__: object) -> None:
+        raise error
+
+    def laying_out(**_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("brrt_cli.app.app", failing)
+    monkeypatch.setattr("brrt.errors.address_space", lambda: 1e9)
+    monkeypatch.setattr("brrt_cli.console.console", laying_out)
+    result = brrt("plan")
+    assert result.code == 2
+    said = "brrt: the memory does not suffice; free some, or use a smaller world or budget\n"
+    assert result.err == said

@@ -333,3 +333,17 @@ def test_a_run_is_made_once() -> None:
     run.execute([])
     with pytest.raises(BrrtError, match=r"made once; make another brrt\.Run\(scenario\)"):
         run.execute([])
+
+
+def test_too_many_branches() -> None:
+    """A run may have a thousand; more are refused, in a file before they are read."""
+    recording, _ = parent(Scenario(world="empty2d", iterations=20, smooth=False))
+    manifest = BranchedRun(recording, iteration=3).manifest
+    many = replace(manifest, branches=manifest.branches * 1000)
+    message = "the run has 1,001 branches, and may have at most 1,000; plan one run with"
+    with pytest.raises(BrrtError, match=message):
+        replace(many, branches=manifest.branches * 1001)
+    texts = many.to_strings()
+    texts["branches"] = f"[{'1, ' * 1000}1]"
+    with pytest.raises(BrrtError, match=message):
+        Manifest.from_strings(texts)

@@ -19,9 +19,11 @@ _LIGHT = np.array([-0.35, -0.55, 0.75])
 _ALPHA_3D = 0.45
 _SEAM = 0.25
 """Line width, in points, that closes hairlines between obstacles that touch."""
-_AROUND, _UP = 24, 12
-"""Faces of a sphere, around and from pole to pole."""
-_MOST_FACES = 40_000
+_AROUND, _AROUND_ROUGH = 24, 8
+"""Faces around a sphere, and around each of very many; from pole to pole there are half of them."""
+_SMOOTH_FACES, _MOST_FACES = 40_000, 200_000
+"""Faces of all spheres up to which they are smooth, and of all obstacles in 3D: a million take
+seconds and gigabytes."""
 
 
 def save_world(world: World, path: Path) -> None:
@@ -163,7 +165,8 @@ def _draw_3d(world: World, ax: Any) -> None:
     from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # noqa: PLC0415
 
-    faces = np.concatenate([_box_faces(world.boxes), _ball_faces(world.balls)])
+    boxes, balls = _largest(world)
+    faces = np.concatenate([_box_faces(boxes), _ball_faces(balls)])
     if len(faces):
         normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
         normals += np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 0])
@@ -171,12 +174,16 @@ def _draw_3d(world: World, ax: Any) -> None:
         light = normals @ (_LIGHT / np.linalg.norm(_LIGHT)) / lengths
         shade = (0.62 + 0.38 * light)[:, None] * rgb(OBSTACLE_3D)
         colours = np.concatenate([shade, np.full((len(shade), 1), _ALPHA_3D)], axis=1)
-        edges = np.where(np.arange(len(faces)) < 6 * len(world.boxes), 0.25, 0.0)
+        edges = np.where(np.arange(len(faces)) < 6 * len(boxes), 0.25, 0.0)
         ax.add_collection3d(
             Poly3DCollection(
                 faces, facecolors=colours, edgecolors=rgb(OBSTACLE), linewidths=edges, zorder=1
             )
         )
+    drawn, there = len(boxes) + len(balls), len(world.boxes) + len(world.balls)
+    if drawn < there:
+        text = f"the largest {drawn:,} of {there:,} obstacles"
+        ax.text2D(0, 0.97, text, transform=ax.transAxes, size=7, color=rgb(OUTLINE))
     ax.computed_zorder = False
     _draw_ends(world, ax)
     limits = zip("xyz", world.lower, world.upper, strict=True)
@@ -189,6 +196,18 @@ def _draw_3d(world: World, ax: Any) -> None:
         axis.set_pane_color((1, 1, 1, 0))
         axis.line.set(color=rgb(OUTLINE), linewidth=0.6)
         axis._axinfo["grid"].update(linewidth=0.25, color="0.85")  # noqa: SLF001 - no public API
+
+
+def _largest(world: World) -> tuple[Floats, Floats]:
+    """Return as many of the boxes and balls as can be drawn, those with the largest radii."""
+    boxes, balls = world.boxes, world.balls
+    radii = np.concatenate([np.linalg.norm(boxes[:, 3:] - boxes[:, :3], axis=1) / 2, balls[:, 3]])
+    faces = np.repeat([6, _AROUND_ROUGH * _AROUND_ROUGH // 2], [len(boxes), len(balls)])
+    if faces.sum() <= _MOST_FACES:
+        return boxes, balls
+    order = np.argsort(-radii, kind="stable")
+    drawn = np.sort(order[np.cumsum(faces[order]) <= _MOST_FACES])
+    return boxes[drawn[drawn < len(boxes)]], balls[drawn[drawn >= len(boxes)] - len(boxes)]
 
 
 def _box_faces(boxes: Floats) -> Floats:
@@ -206,7 +225,8 @@ def _box_faces(boxes: Floats) -> Floats:
 
 def _ball_faces(balls: Floats) -> Floats:
     """Return quadrilateral faces of spheres, fewer of each if there are many; shape (m, 4, 3)."""
-    around = _AROUND if len(balls) * _AROUND * _UP < _MOST_FACES else 8
+    smooth = len(balls) * _AROUND * (_AROUND // 2) < _SMOOTH_FACES
+    around = _AROUND if smooth else _AROUND_ROUGH
     up = around // 2
     a, b = np.meshgrid(
         np.linspace(0, 2 * np.pi, around + 1), np.linspace(-np.pi / 2, np.pi / 2, up + 1)
