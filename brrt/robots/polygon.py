@@ -15,6 +15,9 @@ from brrt.worlds.arrays import check_lengths
 from brrt.worlds.convex import convex_polygon
 from brrt.worlds.world import World
 
+_MOST_PARTS, _MOST_VERTICES = 10_000, 1000
+"""Of a body, and of each part: planning, and judging a plan, would take minutes with more."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygon(Robot):
@@ -45,6 +48,12 @@ class Polygon(Robot):
         x, y = self.length / 2, self.width / 2
         parts = self.parts or ([[-x, -y], [x, -y], [x, y], [-x, y]],)
         checked = tuple(convex_polygon(f"robot: polygons[{i}]", p) for i, p in enumerate(parts))
+        for i, part in enumerate(checked):
+            if len(part) > _MOST_VERTICES:
+                raise BrrtError(
+                    f"robot: polygons[{i}] has {len(part):,} vertices, and may have at most "
+                    f"{_MOST_VERTICES:,}; leave some out"
+                )
         object.__setattr__(self, "parts", checked)
 
     def definition(self) -> dict[str, Any]:
@@ -57,6 +66,11 @@ class Polygon(Robot):
         check_fields(data, "the robot", ("polygons",))
         if not isinstance(data["polygons"], list) or not data["polygons"]:
             raise BrrtError("robot: polygons must be a list of one or more polygons")
+        if len(data["polygons"]) > _MOST_PARTS:
+            raise BrrtError(
+                f"robot: polygons has {len(data['polygons']):,} parts, and may have at most "
+                f"{_MOST_PARTS:,}; make the body of fewer convex polygons"
+            )
         return cls(parts=tuple(data["polygons"]))
 
     @property

@@ -13,6 +13,9 @@ from brrt.worlds.arrays import LEAST, Floats, check_lengths, read_numbers
 _ROUNDING = 1e-9
 """A vertex of a convex polygon may be concave by this sine of its angle: files are rounded."""
 
+_MOST_VERTICES = 30_000
+"""Of a polygon: the time to check it grows with the square of them."""
+
 _MOST_EDGES = 24
 """Number of a polygon's edges that `inscribed` takes into account."""
 
@@ -41,6 +44,11 @@ def convex_polygon(name: str, values: Any) -> Floats:
     vertices = read_numbers(name, values, what, (None, 2))
     if len(vertices) < 2:
         raise BrrtError(f"{name} must be {what}")
+    if len(vertices) > _MOST_VERTICES:
+        raise BrrtError(
+            f"{name} has {len(vertices):,} vertices, and may have at most {_MOST_VERTICES:,}; "
+            "leave some out"
+        )
     vertices = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
     if len(vertices) < 2:
         raise BrrtError(f"{name} must have 2 or more different vertices; these are all the same")
@@ -61,7 +69,7 @@ def convex_polygons(name: str, values: Sequence[Any]) -> tuple[Floats, ...]:
     found: list[Floats | None] = [None] * len(values)
     by_length: dict[int, list[int]] = {}
     for i, value in enumerate(values):
-        if isinstance(value, list | np.ndarray) and len(value) > 2:
+        if isinstance(value, list | np.ndarray) and 2 < len(value) <= _MOST_VERTICES:
             by_length.setdefault(len(value), []).append(i)
     for length, which in by_length.items():
         try:

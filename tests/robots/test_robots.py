@@ -149,6 +149,14 @@ def test_kinds_are_the_names_of_the_registry() -> None:
 
 HEAD = {"schema": "brrt.robot", "version": 1}
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+
+
+def circle(vertices: int) -> list[list[float]]:
+    """Return a regular polygon."""
+    turns = np.linspace(0, 2 * np.pi, vertices, endpoint=False)
+    return [[float(np.cos(turn)), float(np.sin(turn))] for turn in turns]
+
+
 JOINT = {"offset": [0, 0], "link": SQUARE}
 CHAIN = {**HEAD, "kind": "chain", "base": [0, 0]}
 BAD_FILES = {
@@ -161,6 +169,14 @@ BAD_FILES = {
     "bent": (
         {**HEAD, "kind": "polygon", "polygons": [SQUARE, [[0, 0], [4, 0], [1, 1], [0, 4]]]},
         "polygons[1] is not convex at (1, 1); split it into convex polygons",
+    ),
+    "parts": (
+        {**HEAD, "kind": "polygon", "polygons": [SQUARE] * 10_001},
+        "polygons has 10,001 parts, and may have at most 10,000; make the body of fewer",
+    ),
+    "vertices": (
+        {**HEAD, "kind": "polygon", "polygons": [SQUARE, circle(1001)]},
+        "polygons[1] has 1,001 vertices, and may have at most 1,000; leave some out",
     ),
     "3D": ({**HEAD, "kind": "polygon", "polygons": [[[0, 0, 0], [1, 0, 0]]]}, "a pair of numbers"),
     "typo": ({**HEAD, "kind": "polygon", "polygons": [SQUARE], "colour": 1}, "field 'colour'"),

@@ -380,6 +380,10 @@ def test_polygons_are_brought_in_order() -> None:
         ([[0, 0], [1, float("nan")]], "finite numbers"),
         ([[0, 0], [1, 1e101]], "up to 1e+100"),
         ("line", "must be 2 or more vertices"),
+        (
+            [[i, i * i] for i in range(30_001)],
+            "polygons[0] has 30,001 vertices, and may have at most 30,000; leave some out",
+        ),
     ],
 )
 def test_bad_polygons(polygon: object, message: str) -> None:
