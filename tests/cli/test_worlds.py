@@ -465,6 +465,27 @@ def test_a_plot_is_put_where_it_is_asked_for() -> None:
     plt.close("all")
 
 
+@pytest.mark.parametrize("kind", ["balls", "boxes"])
+def test_a_picture_of_very_many_obstacles(kind: str) -> None:
+    """It has the largest, and says of how many; a million would take all memory."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    import matplotlib.pyplot as plt
+
+    n, rng = 50_000, np.random.default_rng(1)
+    centres, radii = rng.uniform(1, 9, (n, 3)), np.linspace(0.01, 0.02, n)
+    balls = np.concatenate([centres, radii[:, None]], axis=1)
+    boxes = np.concatenate([centres - radii[:, None], centres + radii[:, None]], axis=1)
+    shape = {"balls": balls} if kind == "balls" else {"boxes": boxes}
+    axes = plot_world(World("many", np.zeros(3), np.full(3, 10.0), **shape))
+    (text,) = (text.get_text() for text in axes.texts)
+    faces = len(axes.collections[0].get_facecolor())
+    assert text == f"the largest {200_000 // (32 if kind == 'balls' else 6):,} of 50,000 obstacles"
+    assert 199_000 < faces <= 200_000
+    plt.close("all")
+
+
 def test_notes_are_said_and_not_saved(
     brrt: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
