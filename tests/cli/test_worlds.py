@@ -477,7 +477,7 @@ def test_a_picture_of_very_many_obstacles(kind: str) -> None:
     centres, radii = rng.uniform(1, 9, (n, 3)), np.linspace(0.01, 0.02, n)
     balls = np.concatenate([centres, radii[:, None]], axis=1)
     boxes = np.concatenate([centres - radii[:, None], centres + radii[:, None]], axis=1)
-    shape = {"balls": balls} if kind == "balls" else {"boxes": boxes}
+    shape: dict[str, Any] = {"balls": balls} if kind == "balls" else {"boxes": boxes}
     axes = plot_world(World("many", np.zeros(3), np.full(3, 10.0), **shape))
     (text,) = (text.get_text() for text in axes.texts)
     faces = len(axes.collections[0].get_facecolor())
