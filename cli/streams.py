@@ -27,7 +27,13 @@ class Stream(TextIOWrapper):
     error: OSError | None = None
 
     def write(self, text: str) -> int:
-        """Write text; return its length, even if it went nowhere."""
+        """Write text; return its length, even if it went nowhere.
+
+        Raises:
+            TypeError: It is not text; other packages tell text streams from others by this error.
+        """
+        if not isinstance(text, str):
+            raise TypeError(f"write() argument must be str, not {type(text).__name__}")
         self.write_styled(visible(text))
         return len(text)
 

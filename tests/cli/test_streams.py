@@ -58,6 +58,15 @@ def test_frames_without_utf8(command: str, bash: Bash) -> None:
     assert done.stdout.isascii()
 
 
+def test_help_in_a_pipe(bash: Bash) -> None:
+    """It ends with its frame: a stream of texts takes no bytes."""
+    for command in ("--help", "view --help", "worlds --help"):
+        done = bash(f"brrt {command}")
+        assert done.returncode == 0
+        assert b"b'" not in done.stdout
+        assert done.stdout.decode().rstrip().endswith("─╯")
+
+
 @FULL
 @pytest.mark.parametrize("command", [f"{PLAN} --json", "planners", "--help"])
 def test_full_stdout(command: str, bash: Bash) -> None:
