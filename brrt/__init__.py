@@ -33,6 +33,7 @@ _MODULES = {
     "World": "worlds",
     "load_world": "worlds",
     "make_world": "worlds",
+    "Claims": "scenario.claims",
     "Contract": "scenario.contract",
     "Manifest": "scenario.manifest",
     "Scenario": "scenario.scenario",

@@ -38,6 +38,7 @@ from brrt.runs.reproduce import ReproducedRun as ReproducedRun
 from brrt.runs.reproduce import Reproduction as Reproduction
 from brrt.runs.reproduce import reproduce as reproduce
 from brrt.runs.run import Run as Run
+from brrt.scenario.claims import Claims as Claims
 from brrt.scenario.contract import Contract as Contract
 from brrt.scenario.manifest import Manifest as Manifest
 from brrt.scenario.scenario import Scenario as Scenario

@@ -13,6 +13,7 @@ from brrt.recorder.recorder import Recorder
 from brrt.recording import Result, Sink
 from brrt.replay.metrics import Metrics
 from brrt.robots import Robot
+from brrt.scenario.claims import Claims
 from brrt.scenario.contract import Contract
 from brrt.scenario.manifest import Manifest, made_by
 from brrt.scenario.query import Query
@@ -50,6 +51,7 @@ def record(
     iterations: int | None = None,
     time_limit: float | None = None,
     contract: Contract | None = None,
+    claims: Claims | Mapping[str, Any] | None = None,
     clock: Callable[[], int] | None = None,
 ) -> Recorder:
     """Open a recording of a planner; use it in a `with` statement, or call `close`.
@@ -67,6 +69,8 @@ def record(
         iterations: Its limit of iterations, for readers.
         time_limit: Its limit of time in s, for readers.
         contract: What it promises; `brrt.verify` judges by it.
+        claims: How the log is made, such as `{"motions": "own"}`; see `brrt.Claims`. `brrt.verify`
+            leaves out what this excludes.
         clock: Returns the time of the next event in ns since the run began, for converters of
             other logs; by default the time is measured.
 
@@ -93,6 +97,7 @@ def record(
         made_by=made_by(),
         robot=query.robot.to_json(),
         contract=contract,
+        claims=Claims.of(claims),
     )
     sink = BackgroundSink(_MeasuredSink(McapSink(path, manifest, place), manifest), Path(path))
     return Recorder(sink, query, clock)
