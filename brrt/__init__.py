@@ -23,6 +23,7 @@ _MODULES = {
     "Recording": "recording",
     "Sink": "recording",
     "Chain": "robots",
+    "Opaque": "robots",
     "Point": "robots",
     "Polygon": "robots",
     "ROBOTS": "robots",

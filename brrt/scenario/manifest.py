@@ -134,6 +134,11 @@ class Manifest:
         """Return an identifier of the run: equal where everything is, the clock included."""
         return hashlib.sha256(json.dumps(self.to_strings()).encode()).hexdigest()
 
+    @property
+    def knows_robot(self) -> bool:
+        """Whether the robot's shape is known, without which nothing can be said of collisions."""
+        return not self.make_robot().opaque
+
     def make_robot(self) -> Robot:
         """Make the recorded robot; its file need not exist.
 

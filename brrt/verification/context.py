@@ -11,6 +11,7 @@ from brrt.collision.motions import Obstacles, first_hits
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.tree_fold import trees_in
+from brrt.robots import Robot
 from brrt.scenario.claims import Claims
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contracts_of
@@ -20,6 +21,7 @@ from brrt.verification.retention import KeptEvents
 from brrt.verification.timeline import Timeline
 from brrt.verification.tolerances import CLOSE, ROUNDING
 from brrt.verification.tree_history import TreeHistory
+from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,11 +33,15 @@ def waypoints(event: Any, dof: int) -> Floats:
     return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
 
 
-def _unknown(claims: Claims) -> dict[str, str]:
-    """Return what claims exclude, and a sentence that says so."""
+def _unknown(claims: Claims, robot: Robot, world: World) -> dict[str, str]:
+    """Return what is not known, or not as rules take it for granted, and why."""
     stated = claims.stated()
     stated.pop("goal_tolerance", None)  # it excludes nothing
-    return {name: f"the recording claims {name}: {value}" for name, value in stated.items()}
+    found = {name: f"the recording claims {name}: {value}" for name, value in stated.items()}
+    if robot.opaque or not world.bounded:
+        why = "the robot is not known" if world.bounded else "the world is not known"
+        found |= {"collisions": why, "bounds": why}
+    return found
 
 
 class Context:
@@ -58,7 +64,7 @@ class Context:
             one where the run is a branch with other settings.
         claims: How the log was made.
         unknown: What rules cannot take for granted here, and why, by the names that
-            `Rule.assumes` has: claims, and `shape` and `bounds` of the robot.
+            `Rule.assumes` has: claims, and what the robot hits (`collisions`), and its `bounds`.
         contract: The last of them, an empty one if the recording states none.
         has_contract: Whether it states one.
         kept: The events that are kept for the end.
@@ -77,7 +83,7 @@ class Context:
         query = Query.recorded(self.manifest, self.world)
         self.robot, self.start, self.goal = query.robot, query.start, query.goal
         self.lower, self.upper = query.lower, query.upper
-        self.unknown = _unknown(self.claims)
+        self.unknown = _unknown(self.claims, self.robot, self.world)
         stated = (contract,) if contract else contracts_of(self.manifest, self.world)
         firsts = [first for first, _ in self.manifest.stretches]
         self.stretches = tuple(

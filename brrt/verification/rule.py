@@ -134,7 +134,7 @@ class LatticeRule(Rule):
     """A rule that judges a search on a lattice once all events have been read."""
 
     needs = "lattice"
-    assumes = ("motions", "costs", "times", "shape", "bounds")
+    assumes = ("motions", "costs", "times", "collisions", "bounds")
     kind = Kind.EXPAND
 
     def finish(self) -> None:

@@ -175,7 +175,7 @@ def test_each_claim_is_tried_in_both_ways() -> None:
     names = set(Claims().as_dict())
     assert {claim for claim, *_ in ACCUSED_WITHOUT} == names
     assert {claim for claim, *_ in ACCUSED_ALL_THE_SAME} == names
-    assert {name for rule in RULES for name in rule.assumes} <= names | {"shape", "bounds"}
+    assert {name for rule in RULES for name in rule.assumes} <= names | {"collisions", "bounds"}
 
 
 def test_a_foreign_contract_is_held_against_the_planner() -> None:

@@ -104,7 +104,7 @@ def _along_path(context: Context, table: Table) -> Flags:
 class MovesFree(MoveRule):
     name = "moves free"
     promise = "Every move is free of obstacles."
-    assumes = ("motions", "shape")
+    assumes = ("motions", "collisions")
 
     def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
         self.judge_free(table, before, table["q"], "move")

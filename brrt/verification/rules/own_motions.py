@@ -11,7 +11,7 @@ from brrt.verification.rule import Rule
 class ConfigurationsFree(Rule):
     name = "configurations free"
     promise = "Where motions are own, nodes, cells and waypoints are free of obstacles."
-    assumes = ("shape",)
+    assumes = ("collisions",)
 
     def window(self, events: Events, contract: Contract) -> None:
         if self.context.claims.motions == "straight":

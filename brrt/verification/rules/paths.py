@@ -49,7 +49,7 @@ class PathEnds(Rule):
 class PathsFree(Rule):
     name = "paths free"
     promise = "Every motion of every path is free of obstacles."
-    assumes = ("motions", "shape")
+    assumes = ("motions", "collisions")
 
     def finish(self) -> None:
         context, paths = self.context, self.context.paths
@@ -181,7 +181,7 @@ class Shortcuts(Rule):
         "Shortcuts replace what is between two waypoints by a free motion, at no more cost; the "
         "motions of refused ones are not free."
     )
-    assumes = ("motions", "costs", "shape")
+    assumes = ("motions", "costs", "collisions")
 
     def finish(self) -> None:
         context = self.context

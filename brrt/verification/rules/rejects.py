@@ -34,7 +34,7 @@ class Rejections(Rule):
     name = "rejections"
     promise = "A motion that is rejected for a collision touches something."
     needs = ANY_PART
-    assumes = ("motions", "shape")
+    assumes = ("motions", "collisions")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

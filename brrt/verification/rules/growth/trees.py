@@ -127,7 +127,7 @@ class EdgeCosts(CostRule):
 class EdgesFree(TreeRule):
     name = "edges free"
     promise = "Every edge of a tree is free of obstacles."
-    assumes = ("motions", "edges", "shape")
+    assumes = ("motions", "edges", "collisions")
 
     def judge_tree(self, tree: TreeHistory) -> None:
         connected = tree.of_edges(tree.connected)
@@ -204,7 +204,7 @@ class RewiresFree(TreeRule):
     name = "rewires free"
     promise = "The edge to a new parent is free of obstacles."
     kind = None
-    assumes = ("motions", "edges", "shape")
+    assumes = ("motions", "edges", "collisions")
 
     def judge_tree(self, tree: TreeHistory) -> None:
         table = tree.rewires[tree.of_rewires(tree.connected)]
@@ -297,7 +297,7 @@ class LinkCosts(LinkRule):
 class LinksFree(LinkRule):
     name = "links free"
     promise = "Every link between two trees is free of obstacles."
-    assumes = ("motions", "edges", "shape")
+    assumes = ("motions", "edges", "collisions")
 
     def judge_links(self, links: LinkEnds) -> None:
         self.judge_free(links.table, links.a, links.b, "link")

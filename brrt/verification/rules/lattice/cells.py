@@ -211,7 +211,7 @@ class EstimatesAdmissible(Rule):
     name = "estimates admissible"
     promise = "No estimate exceeds the cost of a path to the goal that the log contains."
     needs = "lattice"
-    assumes = ("motions", "costs", "shape")
+    assumes = ("motions", "costs", "collisions")
 
     def finish(self) -> None:
         context, lattice = self.context, self.context.contract.lattice
