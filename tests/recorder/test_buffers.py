@@ -100,7 +100,7 @@ Q = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [9.0, 9.0], [np.nan, 0.0]])
 def told(what: int) -> Buffer:
     """A buffer with events, of which one may be impossible."""
     buffer = empty_buffer(2, 100)
-    tell(buffer, Q, what)
+    tell(buffer, Q, what)  # type: ignore[call-arg, type-var]
     return buffer
 
 
