@@ -10,7 +10,7 @@ from brrt import BrrtError, Kind, World, explain, read, record, verify
 from brrt.robots.opaque import MOST_NUMBERS
 from brrt.views.rerun.drawing import draw_run
 from tests.conftest import Result
-from tests.support.foreign import FIELD
+from tests.support.foreign import FIELD, FOREIGN, recorded
 
 SPACE = World(
     "space", lower=np.zeros(3), upper=np.full(3, 10.0), boxes=np.array([[4.0, 4, 0, 6, 6, 6]])
@@ -94,6 +94,21 @@ def test_places_beyond_the_world(
     for command in COMMANDS:
         done = brrt(*(path if word == "RUN" else word for word in command))
         assert done.code == 0, (command, done.err)
+    draw_run(tmp_path / "view.rrd", read(path))
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_every_command_takes_a_foreign_planner(
+    name: str, brrt: Callable[..., Result], tmp_path: Path
+) -> None:
+    """And verify finds nothing, and does not say that all rules hold."""
+    path = recorded(name, tmp_path / "run.mcap")
+    for command in COMMANDS:
+        done = brrt(*(path if word == "RUN" else word for word in command))
+        assert done.code == 0, (command, done.err)
+    done = brrt("verify", path)
+    assert done.code == 0
+    assert ("all" in done.out.splitlines()[-1]) == (name == "rrt")
     draw_run(tmp_path / "view.rrd", read(path))
 
 
