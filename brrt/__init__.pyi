@@ -29,6 +29,7 @@ from brrt.replay.snapshot import snapshot as snapshot
 from brrt.replay.transcript import transcript as transcript
 from brrt.robots import ROBOTS as ROBOTS
 from brrt.robots import Chain as Chain
+from brrt.robots import Opaque as Opaque
 from brrt.robots import Point as Point
 from brrt.robots import Polygon as Polygon
 from brrt.robots import Robot as Robot
@@ -38,6 +39,7 @@ from brrt.runs.reproduce import ReproducedRun as ReproducedRun
 from brrt.runs.reproduce import Reproduction as Reproduction
 from brrt.runs.reproduce import reproduce as reproduce
 from brrt.runs.run import Run as Run
+from brrt.scenario.claims import Claims as Claims
 from brrt.scenario.contract import Contract as Contract
 from brrt.scenario.manifest import Manifest as Manifest
 from brrt.scenario.scenario import Scenario as Scenario

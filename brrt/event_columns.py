@@ -27,6 +27,10 @@ _COLUMNS = {
 """The column for each type of field; integers have 32 bits."""
 
 
+COUNT, FIRST_SEQ, LAST_T, ORIGIN, TICK, POINTS, UNTIL_T, UNTIL_SEQ, ASKED = range(9)
+"""Places in the `state` of a buffer that kernels write to."""
+
+
 class Place(NamedTuple):
     """Where a field is.
 

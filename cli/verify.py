@@ -86,6 +86,7 @@ def verify(
                 "events": found.events,
                 "rules": [_json(run, result) for result in found.results],
                 "not_judged": found.not_judged,
+                "has_tree": found.has_tree,
                 **({} if again is None else {"rerun": again.as_dict()}),
             }
         )
@@ -169,14 +170,16 @@ def _show(run: Path, found: "Verification", *, long: bool) -> None:
         _show_findings(run, result)
     for reason, names in found.not_judged.items():
         _print_wrapped(f"not judged, {reason}: {', '.join(names)}", indent="")
-    broken = sum(bool(result.broken) for result in judged)
-    print_line(_total(len(judged), broken, found), style="bold red" if broken else "bold green")
+    green = "bold green" if found.has_tree else ""
+    _print_wrapped(
+        _total(len(judged), found), indent="", style=green if found.holds else "bold red"
+    )
 
 
-def _total(judged: int, broken: int, found: "Verification") -> str:
-    if found.not_judged:
-        rest = sum(map(len, found.not_judged.values()))
-        return f"{judged - broken} rules hold, {broken} broken, {rest} could not be judged"
+def _total(judged: int, found: "Verification") -> str:
+    if found.not_judged or not found.has_tree:
+        return found.summary
+    broken = sum(bool(result.broken) for result in found.results)
     return f"{judged} rules, {broken} broken" if broken else f"all {judged} rules hold"
 
 

@@ -24,14 +24,16 @@ DEPTH = 1e-9
 def first_hits(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Ints:
     """Return for each motion the number of something that it hits, or -1, shape (n,).
 
+    It is -1 for a robot that is not known.
+
     Args:
         obstacles: The obstacles.
         robot: The robot: a body with an outline in the plane, or a point, which has none.
         a: Where the motions begin, shape (n, dof).
         b: Where they end, shape (n, dof).
     """
-    if not len(a):
-        return np.empty(0, np.int64)
+    if not len(a) or robot.opaque:
+        return np.full(len(a), -1, np.int64)
     if has_parts(robot, a.shape[1]):
         return swept_hits(obstacles, robot, a, b)
     hit = np.full(len(a), len(obstacles))

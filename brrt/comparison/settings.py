@@ -53,9 +53,13 @@ def settings_of(a: Recording, b: Recording) -> Iterator[Row]:
 
 
 def metadata_of(a: Manifest, b: Manifest) -> Iterator[Row]:
-    """Yield what differs but does not decide what a run does: names, clock, versions, platform."""
+    """Yield what differs but does not decide what a run does.
+
+    Names, the clock, claims, versions, the platform.
+    """
     for name in ("world", "robot", "clock"):
         yield from _row(name, getattr(a.scenario, name), getattr(b.scenario, name))
+    yield from differing("claims", a.claims.as_dict(), b.claims.as_dict())
     yield from differing("", a.made_by, b.made_by)
 
 

@@ -192,6 +192,7 @@ def facts(snapshot: Snapshot, file: str) -> Facts:
     last, solved = figures["iterations"], figures["solved"]
     motions = summary.motions(summary.rejects)
     contract = contract_of(manifest, world)
+    proven = solved and not robot.opaque
     clearance = ClearanceSearch(world, robot, summary).find(start, goal, contract.step)
     return Facts(
         manifest=manifest,
@@ -212,7 +213,7 @@ def facts(snapshot: Snapshot, file: str) -> Facts:
         gap=None if solved else places.gap(),
         coverage=places.coverage(*_reached(summary), last),
         # The path of a solved run proves that there is one.
-        clearance=replace(clearance, connected=True) if solved else clearance,
+        clearance=replace(clearance, connected=True) if proven else clearance,
         progress=_progress(summary.paths, last),
         cells=summary.cells.as_dict(),
         digits={

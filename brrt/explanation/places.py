@@ -130,7 +130,7 @@ class Places:
 
     def spot(self, a: Floats, b: Floats) -> Spot | None:
         """Return the coarse cell with most of the middles of motions; see `blockers`."""
-        if not len(a):
+        if not len(a) or self._robot.opaque:
             return None
         middles = (self._robot.places(a) + self._robot.places(b)) / 2
         lattice = coarse(self._world)

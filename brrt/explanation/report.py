@@ -37,7 +37,8 @@ def rows(f: Facts) -> Iterator[Row]:
     yield ("cells" if f.cells else "tree" if len(f.trees) < 2 else "trees"), _reached(f)
     yield from _course(f)
     yield from _rejected(f)
-    yield "clearance", _clearance(f)
+    if f.manifest.knows_robot:
+        yield "clearance", _clearance(f)
     yield from _goal(f)
     yield from _paths(f)
     yield from _moves(f)
@@ -207,7 +208,8 @@ def _paths(f: Facts) -> Iterator[Row]:
     if p is None:
         return
     straight = ""
-    if f.approach is not None and f.approach.start > 0:
+    lengths = f.manifest.claims.costs == "length"
+    if f.approach is not None and f.approach.start > 0 and lengths:
         straight = f", {p.best_cost / f.approach.start:.3g} times the straight line"
     if p.paths == 1:
         yield "path", f"cost {_number(p.best_cost)}{straight}, found in iteration {p.first:,}"

@@ -9,6 +9,7 @@ from pathlib import Path
 from brrt.errors import BrrtError, RecordingError
 from brrt.events import Events
 from brrt.files import open_file
+from brrt.formats.framing import framed
 from brrt.formats.integrity import BrokenError, CutError, DamagedError
 from brrt.formats.mcap.reader import is_whole, read_mcap
 from brrt.formats.mcap.records import MAGIC
@@ -37,17 +38,17 @@ def read(path: Path | str, *, partial: bool = False) -> Recording:
     if begin.startswith(b"RRF"):
         from brrt.formats.rrd.reader import read_rrd  # noqa: PLC0415 - imports rerun
 
-        return replace(read_rrd(path), name=path.name)
+        return framed(replace(read_rrd(path), name=path.name))
     if begin != MAGIC:
         raise RecordingError(
             f"{path}: not a recording; brrt reads .mcap and .rrd files that it wrote"
         )
     recording = replace(read_mcap(path), name=path.name)
     if not partial:
-        return recording
+        return framed(recording)
     if (recording.result or recording.counts) and not is_whole(path):
         recording = replace(recording, result=None, counts=None)
-    return replace(recording, batches=bound(_until_damage, recording.batches))
+    return framed(replace(recording, batches=bound(_until_damage, recording.batches)))
 
 
 def _first_bytes(path: Path) -> bytes:

@@ -10,15 +10,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.event_columns import CONFIGURATIONS, INTEGERS, LAYOUT, REALS, WIDTH
+from brrt.event_columns import (
+    ASKED,
+    CONFIGURATIONS,
+    COUNT,
+    FIRST_SEQ,
+    INTEGERS,
+    LAST_T,
+    LAYOUT,
+    ORIGIN,
+    POINTS,
+    REALS,
+    TICK,
+    UNTIL_SEQ,
+    UNTIL_T,
+    WIDTH,
+)
 from brrt.events import Kind, Phase
 from brrt.kernels.clock import now_ns
 from brrt.kernels.jit import inline_helper
 
 Floats = NDArray[np.float64]
-
-COUNT, FIRST_SEQ, LAST_T, ORIGIN, TICK, POINTS, UNTIL_T, UNTIL_SEQ, ASKED = range(9)
-"""Places in `Buffer.state`."""
 
 _ASKED_PER_READING = 16
 """Calls of `paused` for each reading of the clock, on a logical clock."""

@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 
 from brrt.errors import BrrtError, unknown
-from brrt.event_columns import LAYOUT, EventColumns
-from brrt.events import FIELDS, LATEST_NS, Events, Kind
-from brrt.kernels.arrays import enlarged
-from brrt.kernels.clock import COMPILED_CLOCK
-from brrt.kernels.emit import (
+from brrt.event_columns import (
     COUNT,
     FIRST_SEQ,
     LAST_T,
+    LAYOUT,
     ORIGIN,
     POINTS,
     TICK,
     UNTIL_SEQ,
     UNTIL_T,
-    Buffer,
-    empty_buffer,
+    EventColumns,
 )
+from brrt.events import FIELDS, LATEST_NS, Events, Kind
+from brrt.kernels.arrays import enlarged
+from brrt.kernels.clock import COMPILED_CLOCK
+from brrt.kernels.emit import Buffer, empty_buffer
 
 _MAX_DELAY_S = 0.25
 """Age at which events are drained although the batch has room: a live view shows them then."""

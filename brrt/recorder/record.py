@@ -5,14 +5,18 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from brrt.errors import BrrtError
 from brrt.events import LATEST_NS, Events
 from brrt.formats.background import BackgroundSink
 from brrt.formats.mcap.sink import McapSink
 from brrt.recorder.recorder import Recorder
+from brrt.recorder.values import configurations
 from brrt.recording import Result, Sink
 from brrt.replay.metrics import Metrics
-from brrt.robots import Robot
+from brrt.robots import Opaque, Robot
+from brrt.scenario.claims import Claims
 from brrt.scenario.contract import Contract
 from brrt.scenario.manifest import Manifest, made_by
 from brrt.scenario.query import Query
@@ -40,26 +44,31 @@ class _MeasuredSink:
 def record(
     path: Path | str,
     *,
-    world: World | Path | str,
+    world: World | Path | str | None = None,
     start: Any = None,
     goal: Any = None,
-    robot: Robot | Path | str = "point",
+    robot: Robot | Path | str | None = None,
+    dof: int | None = None,
     planner: str = "external",
     params: Mapping[str, Any] | None = None,
     seed: int = 0,
     iterations: int | None = None,
     time_limit: float | None = None,
     contract: Contract | None = None,
+    claims: Claims | Mapping[str, Any] | None = None,
     clock: Callable[[], int] | None = None,
 ) -> Recorder:
     """Open a recording of a planner; use it in a `with` statement, or call `close`.
 
     Args:
         path: The .mcap file; it is overwritten.
-        world: Where it plans: a `World`, a generator's name or a file.
+        world: Where it plans: a `World`, a generator's name or a file. None if it is not known:
+            then neither is the robot, and nothing can be said of collisions and bounds.
         start: First configuration, shape (dof,); by default the world's own.
         goal: Last configuration, shape (dof,); by default the world's own.
-        robot: What moves: a `Robot`, a name with parameters or a file.
+        robot: What moves: a `Robot`, a name with parameters or a file. By default a point where a
+            configuration is a position in the world, and else a robot that is not known.
+        dof: Numbers in a configuration, 1 to 32; by default those of the robot, or of the start.
         planner: The planner's name. A recording under the name of a registered planner without a
             contract of its own is judged by that planner's.
         params: Its parameters, for readers.
@@ -67,6 +76,8 @@ def record(
         iterations: Its limit of iterations, for readers.
         time_limit: Its limit of time in s, for readers.
         contract: What it promises; `brrt.verify` judges by it.
+        claims: How the log is made, such as `{"motions": "own"}`; see `brrt.Claims`. `brrt.verify`
+            leaves out what this excludes.
         clock: Returns the time of the next event in ns since the run began, for converters of
             other logs; by default the time is measured.
 
@@ -75,14 +86,15 @@ def record(
     """
     if Path(path).suffix != ".mcap":
         raise BrrtError(f"{path}: name a file that ends in .mcap")
-    place = world if isinstance(world, World) else make_world(str(world))
-    body = robot if isinstance(robot, Robot) else None
+    place, body = _problem(world, robot, dof, start, goal)
     scenario = Scenario(
-        world=place.name, robot=str(robot) if body is None else body.kind, planner=planner,
+        world=place.name, robot=_spec(body), planner=planner,
         params=params or {}, start=start, goal=goal, seed=seed, iterations=iterations,
         time=time_limit, smooth=False,
     )  # fmt: skip
-    query = Query.of(scenario, place, body)
+    query = Query.of(scenario, place, body if isinstance(body, Robot) else None)
+    if dof not in (None, query.dof):
+        raise BrrtError(f"dof must be {query.dof} for robot {scenario.robot}, not {dof!r:.60}")
     manifest = Manifest(
         scenario=scenario,
         start=tuple(query.start.tolist()),
@@ -93,6 +105,43 @@ def record(
         made_by=made_by(),
         robot=query.robot.to_json(),
         contract=contract,
+        claims=Claims.of(claims),
     )
     sink = BackgroundSink(_MeasuredSink(McapSink(path, manifest, place), manifest), Path(path))
     return Recorder(sink, query, clock)
+
+
+def _spec(robot: Robot | str) -> str:
+    """Return the specification of a robot for the scenario."""
+    if isinstance(robot, Opaque):
+        return f"{robot.kind}:numbers={robot.numbers}"
+    return robot if isinstance(robot, str) else robot.kind
+
+
+def _problem(
+    world: World | Path | str | None,
+    robot: Robot | Path | str | None,
+    dof: int | None,
+    start: Any,
+    goal: Any,
+) -> tuple[World, Robot | str]:
+    """Return the world, and the robot or its name.
+
+    Raises:
+        BrrtError: Too little is given, or something that does not fit.
+    """
+    place = world if world is None or isinstance(world, World) else make_world(str(world))
+    if robot is not None:
+        if place is None:
+            raise BrrtError(f"robot {robot!s:.60} needs a world; without one give dof alone")
+        return place, robot if isinstance(robot, Robot) else str(robot)
+    if dof is None:
+        dof = np.size(start) if start is not None or place is None else place.dim
+    if place is not None:
+        return place, "point" if dof == place.dim else Opaque.parse("dof", {"numbers": dof})
+    if start is None or goal is None:
+        name = "start" if start is None else "goal"
+        raise BrrtError(f"{name} must be given: there is no world that has one")
+    body = Opaque.parse("robot opaque", {"numbers": dof, "drawn": 2 if dof < 3 else 3})
+    ends = [configurations(name, [q], dof) for name, q in (("start", start), ("goal", goal))]
+    return World.unknown(body.places(np.concatenate(ends))), body

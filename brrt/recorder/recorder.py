@@ -4,6 +4,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -11,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brrt.errors import BrrtError
-from brrt.events import Kind, Phase, Reason, Source, Stage, Status
+from brrt.event_columns import COUNT, FIRST_SEQ, POINTS, EventColumns
+from brrt.events import Kind, Phase, Reason, Source, Stage, Status, Table
 from brrt.recorder import log
+from brrt.recorder.buffers import Buffer, apply_changes, check_events, columns_of, rising
 from brrt.recorder.nodes import Nodes, from_root
 from brrt.recorder.rows import ROOM, Rows
 from brrt.recorder.values import (
@@ -308,6 +311,51 @@ class Recorder:
                 node, up = next(iter(waiting.items()))
                 raise BrrtError(f"parent of node {node} cannot become {up}: a circle, or a root")
             parents = waiting
+
+    def take(self, buffer: Buffer) -> None:
+        """Record the events that compiled kernels wrote to a buffer, and empty it.
+
+        Args:
+            buffer: Made by `brrt.kernels.emit.empty_buffer`, and written to by its functions
+                `emit_edge` and so on. Its nodes and costs are the kernel's own; its times are kept,
+                unless the recording has a clock of the caller.
+
+        Raises:
+            BrrtError: An event has an impossible value; none of the buffer is recorded then.
+        """
+        with self._lock:
+            self._check_open()
+            columns = columns_of(buffer, self._dof)
+            events = check_events(columns, self._trees, self._cells, self._iteration)
+            if not len(events):
+                return
+            now = self._now()
+            t = columns.t - self._origin if self._origin else np.full(len(events), now)
+            columns = replace(columns, t=rising(t, self._rows.last_t))
+            self._put_columns(columns, events[Kind.PATH])
+            apply_changes(events, self._trees)
+            self._iteration, self._counts_samples = int(columns.iteration[-1]), False
+            self._cells = max(self._cells, int(events[Kind.EXPAND]["cell"].max(initial=-1)) + 1)
+            self._solved |= len(events[Kind.PATH]) > 0
+            buffer.state[FIRST_SEQ] += len(events)
+            buffer.state[[COUNT, POINTS]] = 0
+
+    def _put_columns(self, columns: EventColumns, paths: Table) -> None:
+        """Record checked events, of which the paths have waypoints."""
+        done = 0
+        for stop, path in zip(
+            [*paths["seq"].tolist(), len(columns.kind)], [*paths, None], strict=True
+        ):
+            while done < stop:
+                self._make_room()
+                done += self._rows.put_columns(columns, slice(done, stop))
+            if path is not None:
+                self._make_room()
+                self._rows.put_path(
+                    int(columns.t[stop]), int(path["iteration"]), int(path["stage"]),
+                    float(path["cost"]), path["waypoints"].copy(),
+                )  # fmt: skip
+                done += 1
 
     def flush(self) -> None:
         """Hand the events so far to the sink."""

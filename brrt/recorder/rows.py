@@ -134,6 +134,15 @@ class Rows:
         self.last_t, self.count = first + count - 1, self.count + count
         return count
 
+    def put_columns(self, columns: EventColumns, part: slice) -> int:
+        """Append as many events without waypoints as there is room for; return how many."""
+        count: int = min(part.stop - part.start, ROOM - self.count)
+        rows = self._rows[self.count : self.count + count]
+        for name in ("kind", "t", "iteration", INTEGERS, REALS, CONFIGURATIONS):
+            rows[name] = getattr(columns, name)[part.start : part.start + count]
+        self.last_t, self.count = int(rows["t"][-1]), self.count + count
+        return count
+
     def take(self) -> Events:
         """Return the events as a batch, and begin another one."""
         rows, first = self._rows[: self.count], self._first

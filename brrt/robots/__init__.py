@@ -7,12 +7,15 @@ from pathlib import Path
 from brrt.errors import BrrtError, unknown
 from brrt.files import is_file, read_text
 from brrt.robots.chain import Chain
+from brrt.robots.opaque import Opaque
 from brrt.robots.point import Point
 from brrt.robots.polygon import Polygon
 from brrt.robots.robot import SCHEMA, VERSION, Robot
 from brrt.settings import parse_pairs
 
-ROBOTS: Mapping[str, type[Robot]] = {"point": Point, "polygon": Polygon, "chain": Chain}
+ROBOTS: Mapping[str, type[Robot]] = {
+    "point": Point, "polygon": Polygon, "chain": Chain, "opaque": Opaque,
+}  # fmt: skip
 
 _MAX_BYTES = 16_000_000
 
@@ -87,6 +90,7 @@ def robot_from_json(text: str) -> Robot:
 __all__ = [
     "ROBOTS",
     "Chain",
+    "Opaque",
     "Point",
     "Polygon",
     "Robot",

@@ -28,10 +28,13 @@ class Robot(Settings):
 
     Attributes:
         kind: The robot's name in the registry and in files.
+        opaque: Whether its shape and limits are not known, so that nothing can be said of its
+            collisions.
     """
 
     greatest_number: ClassVar[float] = GREATEST
     kind: ClassVar[str]
+    opaque: ClassVar[bool] = False
 
     def resolved(self, world: World) -> Self:  # noqa: ARG002
         """Return the robot with the settings filled in whose defaults depend on the world.

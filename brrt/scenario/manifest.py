@@ -4,13 +4,14 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from importlib.metadata import version
 from typing import Any, Self
 
 from brrt.errors import BrrtError
 from brrt.robots import ROBOTS, Robot, mark_robot_file, names_robot_file, robot_from_json
+from brrt.scenario.claims import Claims
 from brrt.scenario.contract import Contract
 from brrt.scenario.scenario import Scenario
 
@@ -82,6 +83,7 @@ class Manifest:
             before robots were recorded, whose scenario names a robot without a file.
         branches: Where the settings changed, in order, for a run that continues a recorded one.
         contract: What the planner promises, by the settings of `scenario`; None if not stated.
+        claims: How the log was made.
     """
 
     scenario: Scenario
@@ -94,6 +96,7 @@ class Manifest:
     robot: str | None = None
     branches: tuple[Branch, ...] = ()
     contract: Contract | None = None
+    claims: Claims = field(default_factory=Claims)
 
     FORMAT, BRANCHED = "1", "2"
     """Runs with branches have a format of their own: a reader that does not know them would apply
@@ -135,6 +138,11 @@ class Manifest:
         """Return an identifier of the run: equal where everything is, the clock included."""
         return hashlib.sha256(json.dumps(self.to_strings()).encode()).hexdigest()
 
+    @property
+    def knows_robot(self) -> bool:
+        """Whether the robot's shape is known, without which nothing can be said of collisions."""
+        return not self.make_robot().opaque
+
     def make_robot(self) -> Robot:
         """Make the recorded robot; its file need not exist.
 
@@ -148,6 +156,8 @@ class Manifest:
         texts = {} if self.robot is None else {"robot": self.robot}
         if self.contract is not None:
             texts["contract"] = json.dumps(self.contract.as_dict())
+        if self.claims.stated():
+            texts["claims"] = json.dumps(self.claims.stated())
         if self.branches:
             texts["branches"] = json.dumps([branch.as_dict() for branch in self.branches])
             # Apart from the branches: older versions of brrt refuse unknown fields in these.
@@ -187,6 +197,7 @@ class Manifest:
                 texts.get("robot"),
                 _branches(texts),
                 _contract(_json(texts.get("contract", "null"))),
+                _claims(_json(texts.get("claims", "null"))),
             )
         except KeyError as error:
             raise BrrtError(f"the manifest is damaged: it has no {error}") from None
@@ -246,6 +257,18 @@ def _contract(values: Any) -> Contract | None:
         return Contract.from_dict(values)
     except BrrtError as error:
         raise BrrtError(f"the manifest is damaged: its contract: {error}") from None
+
+
+def _claims(values: Any) -> Claims:
+    """Read what `Claims.stated` returned.
+
+    Raises:
+        BrrtError: They are damaged, or have fields that this version does not know.
+    """
+    try:
+        return Claims.of(values)
+    except BrrtError as error:
+        raise BrrtError(f"the manifest is damaged: its claims: {error}") from None
 
 
 @cache

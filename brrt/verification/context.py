@@ -11,6 +11,8 @@ from brrt.collision.motions import Obstacles, first_hits
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.tree_fold import trees_in
+from brrt.robots import Robot
+from brrt.scenario.claims import Claims
 from brrt.scenario.contract import Contract
 from brrt.scenario.contracts import contracts_of
 from brrt.scenario.query import Query
@@ -19,6 +21,7 @@ from brrt.verification.retention import KeptEvents
 from brrt.verification.timeline import Timeline
 from brrt.verification.tolerances import CLOSE, ROUNDING
 from brrt.verification.tree_history import TreeHistory
+from brrt.worlds.world import World
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,6 +31,17 @@ Flags = NDArray[np.bool_]
 def waypoints(event: Any, dof: int) -> Floats:
     """Return the configurations of a path event, shape (n, dof)."""
     return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
+
+
+def _unknown(claims: Claims, robot: Robot, world: World) -> dict[str, str]:
+    """Return what is not known, or not as rules take it for granted, and why."""
+    stated = claims.stated()
+    stated.pop("goal_tolerance", None)  # it excludes nothing
+    found = {name: f"the recording claims {name}: {value}" for name, value in stated.items()}
+    if robot.opaque or not world.bounded:
+        why = "the robot is not known" if world.bounded else "the world is not known"
+        found |= {"collisions": why, "bounds": why}
+    return found
 
 
 class Context:
@@ -48,6 +62,9 @@ class Context:
         upper: Greatest value of each coordinate, shape (dof,).
         stretches: For each contract the number of its first event, and the contract: more than
             one where the run is a branch with other settings.
+        claims: How the log was made.
+        unknown: What rules cannot take for granted here, and why, by the names that
+            `Rule.assumes` has: claims, and what the robot hits (`collisions`), and its `bounds`.
         contract: The last of them, an empty one if the recording states none.
         has_contract: Whether it states one.
         kept: The events that are kept for the end.
@@ -62,9 +79,11 @@ class Context:
     def __init__(self, recording: Recording, contract: Contract | None = None) -> None:
         self.manifest, self.world = recording.manifest, recording.world
         self.result, self.dof = recording.result, recording.manifest.dof
+        self.claims = self.manifest.claims
         query = Query.recorded(self.manifest, self.world)
         self.robot, self.start, self.goal = query.robot, query.start, query.goal
         self.lower, self.upper = query.lower, query.upper
+        self.unknown = _unknown(self.claims, self.robot, self.world)
         stated = (contract,) if contract else contracts_of(self.manifest, self.world)
         firsts = [first for first, _ in self.manifest.stretches]
         self.stretches = tuple(
@@ -135,6 +154,12 @@ class Context:
     def equal(self, a: Floats, b: Floats) -> Flags:
         """Return whether lengths are equal within rounding; not a number equals nothing."""
         return np.asarray(np.abs(a - b) <= CLOSE * np.abs(b) + self.tolerance)
+
+    def right_cost(self, cost: Floats, length: Floats) -> Flags:
+        """Return whether costs are right: lengths, or no less if motions are the planner's own."""
+        if self.claims.motions == "own":
+            return self.at_most(length, cost)
+        return self.equal(cost, length)
 
     def at_most(self, a: Floats, limit: Floats | float) -> Flags:
         """Return whether lengths are within a limit, within rounding."""

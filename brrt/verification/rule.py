@@ -28,6 +28,8 @@ class Rule:
         needs: The part of a contract that it judges by, a field of `Contract` or `ANY_PART`; it
             skips recordings whose contract promises nothing of the kind. Empty if all planners
             promise it.
+        assumes: What must be so for it to judge: names of claims whose default it takes for
+            granted, and of other parts of `Context.unknown`.
         kind: Without events of this kind there is nothing to judge; None if that depends.
         of_end: Whether it judges the end of a run, which cut recordings lack.
         context: The recording.
@@ -37,6 +39,7 @@ class Rule:
     name: ClassVar[str]
     promise: ClassVar[str]
     needs: ClassVar[str] = ""
+    assumes: ClassVar[tuple[str, ...]] = ()
     kind: ClassVar[Kind | None] = None
     of_end: ClassVar[bool] = False
 
@@ -100,6 +103,7 @@ class IterationRule(Rule):
     """A rule that judges the iterations of planners that grow trees, as soon as they end."""
 
     needs = "growth"
+    assumes: ClassVar[tuple[str, ...]] = ("samples", "times")
     kind: ClassVar[Kind | None] = Kind.SAMPLE
 
     def window(self, events: Events, contract: Contract) -> None:  # noqa: ARG002
@@ -130,6 +134,7 @@ class LatticeRule(Rule):
     """A rule that judges a search on a lattice once all events have been read."""
 
     needs = "lattice"
+    assumes = ("motions", "costs", "times", "collisions", "bounds")
     kind = Kind.EXPAND
 
     def finish(self) -> None:

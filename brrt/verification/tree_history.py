@@ -81,6 +81,15 @@ class TreeHistory:
         """Costs that the changes lead to by the parent's cost and the distance, shape (m,)."""
         return self.fold.parent_cost + self.length
 
+    @cached_property
+    def stated_before(self) -> Floats:
+        """What the last event of its node stated as its cost, nan for the first one, shape (m,)."""
+        order = np.argsort(self.changes.node, kind="stable")
+        node, stated = self.changes.node[order], self.changes.stated[order]
+        found = np.full(len(order), np.nan)
+        found[order[1:]] = np.where(node[1:] == node[:-1], stated[:-1], np.nan)
+        return found
+
     def chunks(self) -> Iterator[slice]:
         """Yield slices of the edges, of which there may be millions."""
         for first in range(0, len(self.edges), _CHUNK):

@@ -22,6 +22,8 @@ _MADE_BY = {
 }  # fmt: skip
 """Parts of a contract, and events of planners that could promise them."""
 
+NO_TREE = "without edges the log proves nothing of a tree"
+
 _PARTS = {Kind.SAMPLE: "samples", Kind.EDGE: "edges", Kind.EXPAND: "expanded cells"}
 """Kinds of events without which a planner's work cannot be judged."""
 
@@ -37,6 +39,8 @@ class Verification:
         has_contract: Whether there is a contract; without one only what all planners promise is
             judged.
         is_cut: Whether the run's end is missing; then no rule judges it.
+        has_tree: Whether there are edges or expanded cells; a log without them proves nothing of
+            a tree.
     """
 
     results: list[RuleResult]
@@ -44,6 +48,7 @@ class Verification:
     events: int
     has_contract: bool
     is_cut: bool
+    has_tree: bool
 
     def __str__(self) -> str:
         judged = [result for result in self.results if result.examined]
@@ -53,9 +58,16 @@ class Verification:
         lines += [
             f"not judged, {why}: {', '.join(names)}" for why, names in self.not_judged.items()
         ]
+        return "\n".join([*lines, self.summary])
+
+    @property
+    def summary(self) -> str:
+        """How many rules hold, are broken and could not be judged."""
+        judged = sum(result.examined > 0 for result in self.results)
+        broken = sum(result.broken > 0 for result in self.results)
         rest = sum(map(len, self.not_judged.values()))
-        count = f"{len(judged) - len(broken)} rules hold, {len(broken)} broken"
-        return "\n".join([*lines, f"{count}, {rest} could not be judged"])
+        count = f"{judged - broken} rules hold, {broken} broken, {rest} could not be judged"
+        return count if self.has_tree else f"{count}; {NO_TREE}"
 
     @property
     def holds(self) -> bool:
@@ -88,7 +100,7 @@ def verify(
     """
     context = Context(recording, contract)
     made = [rule(context) for rule in rules]
-    active = [rule for rule in made if _applies(rule)]
+    active = [rule for rule in made if _applies(rule) and _unknown(rule) is None]
     firsts = [first for first, _ in context.stretches[1:]]
     with np.errstate(all="ignore"):  # a log may hold any numbers
         for events in _windows(recording.batches(), firsts):
@@ -99,8 +111,11 @@ def verify(
         for rule in active:
             rule.finish()
     results = [rule.result for rule in made]
-    missing, count = _not_judged(made), context.kept.count
-    return Verification(results, missing, count, context.has_contract, context.is_cut)
+    missing, kept = _not_judged(made), context.kept
+    has_tree = not kept.kinds.isdisjoint({Kind.EDGE, Kind.EXPAND})
+    return Verification(
+        results, missing, kept.count, context.has_contract, context.is_cut, has_tree
+    )
 
 
 def _windows(batches: Iterable[Events], firsts: list[int]) -> Iterator[Events]:
@@ -139,6 +154,12 @@ def _applies(rule: Rule) -> bool:
     return any(getattr(contract, rule.needs) is not None for _, contract in rule.context.stretches)
 
 
+def _unknown(rule: Rule) -> str | None:
+    """Return why something is not so that a rule takes for granted; None if all is."""
+    unknown = rule.context.unknown
+    return next((unknown[name] for name in rule.assumes if name in unknown), None)
+
+
 def _not_judged(rules: list[Rule]) -> dict[str, list[str]]:
     """Return the names of the rules that could not judge, for each reason."""
     found: dict[str, list[str]] = {}
@@ -162,6 +183,9 @@ def _reason(rule: Rule) -> str | None:
         # A registered planner promises nothing of the kind; another one may have left it out.
         made = _MADE_BY[part] in context.kept.kinds
         return f"the contract states no {part}" if made else None
+    unknown = _unknown(rule)
+    if unknown is not None:
+        return unknown if _applies(rule) else None
     if rule.kind not in _PARTS or rule.kind in context.kept.kinds or not _applies(rule):
         return None
     searches = context.contract.lattice is not None or Kind.EXPAND in context.kept.kinds

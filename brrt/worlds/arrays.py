@@ -14,6 +14,9 @@ Bools = NDArray[np.bool_]
 GREATEST = 1e100
 """Largest absolute value of a coordinate: kernels square coordinates, which must not overflow."""
 
+_MARGIN, _THIN = 0.05, 1e-6
+"""Space around points, as a part of their longest range, and that as a part of the coordinates."""
+
 LEAST = 1 / GREATEST
 """Least length but 0: the squares of lengths must not underflow either."""
 
@@ -76,3 +79,12 @@ def _wrong_row(values: Any, width: tuple[int | None, ...]) -> str:
         if not numbers or len(row) != wanted:
             return f"; row {i} is not"
     return ""
+
+
+def box_around(points: Floats) -> tuple[Floats, Floats]:
+    """Return the corners of a box around points, shape (n, d), with space at its sides."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = max(float((high - low).max()), _THIN * float(np.abs(points).max())) or 1.0
+    # A side is no shorter than a tenth of the longest: views divide by it.
+    more = np.maximum(_MARGIN * size, (_MARGIN * 2 * size - (high - low)) / 2)
+    return low - more, high + more

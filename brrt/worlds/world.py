@@ -12,14 +12,15 @@ import numpy as np
 from brrt.digits import digits_within, join_numbers, tell_apart
 from brrt.errors import BrrtError, unknown
 from brrt.files import parse_json, replacing
-from brrt.worlds.arrays import Floats, check_lengths, read_numbers
+from brrt.worlds.arrays import Floats, box_around, check_lengths, read_numbers
 from brrt.worlds.convex import convex_polygons, gap, rectangle
 from brrt.worlds.occupancy import Grid
 
-SCHEMA, VERSION, VERSION_WITH_GRID = "brrt.world", 1, 2
-"""A world with a grid has its own version, so that a brrt that knows no grids refuses it."""
+SCHEMA, VERSION, VERSION_WITH_GRID, VERSION_UNBOUNDED = "brrt.world", 1, 2, 3
+"""Worlds with a grid, and without bounds, have their own versions: an older brrt refuses them."""
 
-_FIELDS = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons", "grid", "y_down")
+_FIELDS = ("lower", "upper", "balls", "boxes", "start", "goal", "polygons", "grid", "y_down",
+           "bounded")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +40,7 @@ class World:
         grid: Occupancy grid, in 2D only.
         notes: Remarks of the generator or loader for the user; not saved.
         y_down: Whether y points down when the world is drawn, as in image coordinates.
+        bounded: Whether there are bounds; otherwise `lower` and `upper` are what is drawn.
 
     Raises:
         BrrtError: A shape is wrong, a number is not finite, or a minimum exceeds its maximum.
@@ -55,6 +57,7 @@ class World:
     grid: Grid | None = None
     notes: tuple[str, ...] = ()
     y_down: bool = False
+    bounded: bool = True
 
     @classmethod
     def of_grid(
@@ -118,10 +121,16 @@ class World:
             radius = self.balls[i, dim]
             raise BrrtError(f"world: balls[{i}]: the radius must be at least 0, not {radius:g}")
         check_lengths("world: radii of balls", self.balls[:, dim])
-        if not isinstance(self.y_down, bool):
-            raise BrrtError("world: y_down must be true or false")
+        for name in ("y_down", "bounded"):
+            if not isinstance(getattr(self, name), bool):
+                raise BrrtError(f"world: {name} must be true or false")
         if self.grid is not None and dim != 2:
             raise BrrtError(f"world: grids are for 2D worlds; this one is {dim}D")
+
+    @classmethod
+    def unknown(cls, points: Floats) -> Self:
+        """Return a world of which nothing is known, drawn around points of shape (n, d)."""
+        return cls("none", *box_around(points), bounded=False)
 
     @property
     def dim(self) -> int:
@@ -223,6 +232,8 @@ class World:
             data["grid"] = self.grid.as_json()
         if self.y_down:
             data["y_down"] = True
+        if not self.bounded:
+            data |= {"version": VERSION_UNBOUNDED, "bounded": False}
         return json.dumps(data)
 
     @classmethod
@@ -235,10 +246,10 @@ class World:
         data = parse_json(text, "a JSON world")
         if not isinstance(data, dict) or data.get("schema") != SCHEMA:
             raise BrrtError(f'not a brrt world: the field "schema" must be "{SCHEMA}"')
-        if data.get("version") not in (VERSION, VERSION_WITH_GRID):
+        if data.get("version") not in (VERSION, VERSION_WITH_GRID, VERSION_UNBOUNDED):
             raise BrrtError(
-                f"world version {data.get('version')!r} is not {VERSION} or {VERSION_WITH_GRID}; "
-                f"update brrt"
+                f"world version {data.get('version')!r} is not {VERSION}, {VERSION_WITH_GRID} or "
+                f"{VERSION_UNBOUNDED}; update brrt"
             )
         for name in ("lower", "upper"):
             if name not in data:

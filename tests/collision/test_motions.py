@@ -91,6 +91,8 @@ def test_polygons_are_like_boxes(seed: int) -> None:
 class Bar:
     """A thin bar that turns about its middle; the angle wraps."""
 
+    opaque = False
+
     shape = np.array([[-1.0, -0.1], [1, -0.1], [1, 0.1], [-1, 0.1]])
 
     def outline(self, q: Floats) -> list[Floats]:

@@ -43,9 +43,9 @@ def arguments(buffer: emit.Buffer, fields: tuple[Field, ...]) -> list[Any]:
         if f.type == "q":
             found += [Q, i]
         elif f.type == "q[]":
-            first = int(buffer.state[emit.POINTS])
+            first = int(buffer.state[event_columns.POINTS])
             buffer.points[first : first + len(value)] = value
-            buffer.state[emit.POINTS] += len(value)
+            buffer.state[event_columns.POINTS] += len(value)
             found += [first, len(value)]
         else:
             found.append(float(value) if f.type.startswith("float") else value)

@@ -139,6 +139,10 @@ def test_what_cannot_be_judged_is_said() -> None:
     bare = reasons(unknown.without(Kind.SAMPLE, Kind.EDGE, Kind.REJECT))
     assert trees - {"paths in trees", "edge lengths"} <= set(bare["no edges"])
     assert "samples" in bare["no samples"]
+    assert "proves nothing of a tree" not in str(verify(rrt.recording()))
+    for case in (rrt.without(Kind.EDGE), unknown.without(Kind.SAMPLE, Kind.EDGE, Kind.REJECT)):
+        text = str(verify(case.recording()))
+        assert text.endswith("judged; without edges the log proves nothing of a tree")
     cells = planned("a-star").without(Kind.EXPAND)
     assert "best first" in reasons(cells)["no expanded cells"]
     assert "no edges" not in reasons(cells)
@@ -260,7 +264,7 @@ def test_verify_json(brrt: Callable[..., Result], tmp_path: Path) -> None:
     assert done.code == 0
     shape = {
         "holds": bool, "planner_known": bool, "cut": bool, "events": int, "rules": list,
-        "not_judged": dict,
+        "not_judged": dict, "has_tree": bool,
     }  # fmt: skip
     assert {name: type(value) for name, value in done.json.items()} == shape
     assert done.json["holds"]

@@ -107,8 +107,8 @@ def test_good_json() -> None:
     [
         ({"schema": "other"}, 'the field "schema" must be "brrt.world"'),
         ({"schema": None}, 'the field "schema" must be "brrt.world"'),
-        ({"version": 3}, "world version 3 is not 1 or 2; update brrt"),
-        ({"version": None}, "world version None is not 1 or 2"),
+        ({"version": 4}, "world version 4 is not 1, 2 or 3; update brrt"),
+        ({"version": None}, "world version None is not 1, 2 or 3"),
         ({"lower": ...}, 'the field "lower" is missing'),
         ({"upper": ...}, 'the field "upper" is missing'),
         ({"lower": [0]}, "bounds must have 2 or 3 coordinates"),

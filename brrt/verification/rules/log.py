@@ -125,6 +125,7 @@ class Bounds(Rule):
         "Samples, nodes, cells, moves and waypoints are within bounds and joint limits, "
         "angles that wrap in [-pi, pi)."
     )
+    assumes = ("bounds",)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

@@ -72,6 +72,7 @@ class FrequencyRule(LongRunRule):
 
     needs = "draws"
     kind = Kind.SAMPLE
+    assumes = ("samples", "times")
     what: ClassVar[str]
 
     def __init__(self, context: Context) -> None:
@@ -118,6 +119,7 @@ class UniformDraws(LongRunRule):
     )
     needs = "draws"
     kind = Kind.SAMPLE
+    assumes = ("samples", "bounds")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -159,6 +161,7 @@ class UniformInformedDraws(LongRunRule):
         "million recordings)."
     )
     needs = "draws"
+    assumes = ("samples", "costs", "times", "bounds")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

@@ -63,6 +63,7 @@ class Moves(MoveRule):
 class MoveCosts(MoveRule):
     name = "move costs"
     promise = "A move's cost is that of the move before plus its own length."
+    assumes = ("motions", "costs")
 
     def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
         stated = np.asarray(table["cost"])
@@ -77,6 +78,7 @@ class MoveCosts(MoveRule):
 class MoveLengths(MoveRule):
     name = "move lengths"
     promise = "No move is longer than allowed."
+    assumes = ("motions",)
 
     def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
         context, lattice = self.context, self.context.contract.lattice
@@ -102,6 +104,7 @@ def _along_path(context: Context, table: Table) -> Flags:
 class MovesFree(MoveRule):
     name = "moves free"
     promise = "Every move is free of obstacles."
+    assumes = ("motions", "collisions")
 
     def judge_moves(self, table: Table, before: Floats, first: Flags) -> None:
         self.judge_free(table, before, table["q"], "move")

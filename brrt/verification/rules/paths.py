@@ -25,7 +25,7 @@ MOST = 20_000
 
 class PathEnds(Rule):
     name = "path ends"
-    promise = "Paths lead from the start to the goal."
+    promise = "Paths lead from the start to the goal, or as close to it as claimed."
 
     def finish(self) -> None:
         start, goal = self.context.start, self.context.goal
@@ -35,14 +35,21 @@ class PathEnds(Rule):
                 wrong = "a path without waypoints"
             elif (path[0] != start).any():
                 wrong = "begins at {}; the start is {}".format(*vectors(path[0], start))
-            elif (path[-1] != goal).any():
+            elif (path[-1] != goal).any() and not self._reaches(path[-1]):
                 wrong = "ends at {}; the goal is {}".format(*vectors(path[-1], goal))
             self.judge_one(event, wrong)
+
+    def _reaches(self, q: Floats) -> bool:
+        """Whether a path may end at a configuration by the claims."""
+        context, tolerance = self.context, self.context.claims.goal_tolerance
+        far = context.distance(q[None], context.goal[None])
+        return tolerance > 0 and bool(context.at_most(far, tolerance)[0])
 
 
 class PathsFree(Rule):
     name = "paths free"
     promise = "Every motion of every path is free of obstacles."
+    assumes = ("motions", "collisions")
 
     def finish(self) -> None:
         context, paths = self.context, self.context.paths
@@ -59,12 +66,13 @@ class PathsFree(Rule):
 
 class PathCosts(Rule):
     name = "path costs"
-    promise = "A path's cost is its length in the robot's metric."
+    promise = "A path's cost is its length in the robot's metric; no less if motions are own."
+    assumes = ("costs",)
 
     def finish(self) -> None:
         for event, path in self.context.paths:
             length = self.context.distance(path[:-1], path[1:]).sum()
-            right = bool(self.context.equal(event["cost"], length))
+            right = bool(self.context.right_cost(event["cost"], length))
             wrong = f"the cost is {event['cost']:.12g}; the length, {length:.12g}"
             self.judge_one(event, None if right else wrong)
 
@@ -97,6 +105,7 @@ class PathsInTrees(Rule):
     promise = "The motions of a tree planner's path are edges of that moment, or links."
     needs = ANY_PART
     kind = Kind.EDGE
+    assumes = ("times",)
 
     def finish(self) -> None:
         paths = self.context.planned_paths
@@ -172,6 +181,7 @@ class Shortcuts(Rule):
         "Shortcuts replace what is between two waypoints by a free motion, at no more cost; the "
         "motions of refused ones are not free."
     )
+    assumes = ("motions", "costs", "collisions")
 
     def finish(self) -> None:
         context = self.context

@@ -195,6 +195,8 @@ class Endings(Rule):
         """Return what is left of the budget of iterations, if that matters."""
         context = self.context
         scenario, draws = context.manifest.scenario, context.kept.last_iteration
+        if scenario.iterations is None and not context.contract.planner.registered:
+            return None  # the limit is not stated
         limit = scenario.iteration_limit(context.contract.planner.default_iterations)
         made = _iterations(context)
         # Where failed draws do not count, they are limited all the same.

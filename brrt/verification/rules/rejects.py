@@ -34,6 +34,7 @@ class Rejections(Rule):
     name = "rejections"
     promise = "A motion that is rejected for a collision touches something."
     needs = ANY_PART
+    assumes = ("motions", "collisions")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -66,6 +67,7 @@ class Reasons(Rule):
     name = "reasons"
     promise = "Rejections have a reason that the planner can have, and that is true."
     needs = ANY_PART
+    assumes = ("motions", "costs", "times")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -138,6 +140,7 @@ class Limits(Rule):
     promise = (
         "Motions rejected for the limits exceed them; on a lattice, no other rejected motion does."
     )
+    assumes = ("bounds",)
 
     def window(self, events: Events, contract: Contract) -> None:
         context, table = self.context, events[Kind.REJECT]

@@ -27,8 +27,12 @@ _KEYS = np.dtype([("key", "<u8"), ("first", "<f8"), ("seq", "<i8")])
 
 class Samples(Rule):
     name = "samples"
-    promise = "Samples of the goal are the goal (of tree 1 also the start), and no others are."
+    promise = (
+        "Samples of the goal are the goal, as closely as claimed (of tree 1 also the start), and "
+        "no others are."
+    )
     kind = Kind.SAMPLE
+    assumes = ("samples",)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -45,6 +49,9 @@ class Samples(Rule):
         goals = table[table["source"] == Source.GOAL]
         wrong = (goals["q"] != context.goal).any(axis=1)
         wrong &= (goals["tree"] != 1) | (goals["q"] != context.start).any(axis=1)
+        if context.claims.goal_tolerance:
+            far = context.distance(goals["q"], context.goal[None])
+            wrong &= ~context.at_most(far, context.claims.goal_tolerance)
         self.judge(goals, wrong, lambda i: f"sample {vector(goals['q'][i])} is not the goal")
 
 
@@ -53,6 +60,7 @@ class Sources(Rule):
     promise = "Each sample is from a source that the planner uses then; a path ends some runs."
     needs = "draws"
     kind = Kind.SAMPLE
+    assumes = ("samples", "times")
 
     def window(self, events: Events, contract: Contract) -> None:
         if contract.draws is None:
@@ -87,6 +95,7 @@ def _allowed(draws: Draws, drawn: Drawn) -> dict[Source, Flags]:
 class InformedSamples(Rule):
     name = "informed samples"
     promise = "Informed samples are where a path may cost less than the best; of points alone."
+    assumes = ("samples", "costs", "times")
 
     def window(self, events: Events, contract: Contract) -> None:
         context = self.context
@@ -105,6 +114,7 @@ class InformedNodes(Rule):
     name = "informed nodes"
     promise = "Where samples are informed, no node joins through which no path can cost less."
     needs = "near"
+    assumes = ("costs", "times")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -134,6 +144,7 @@ class RepeatedDraws(Rule):
     promise = "No uniform or informed sample is drawn twice."
     needs = "draws"
     kind = Kind.SAMPLE
+    assumes = ("samples", "bounds")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

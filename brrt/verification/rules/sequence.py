@@ -24,6 +24,7 @@ class Iterations(Rule):
         "LRTA*, of moves."
     )
     needs = ANY_PART
+    assumes = ("samples", "times")
     begun, before = 0, 0
 
     def __init__(self, context: Context) -> None:
@@ -51,6 +52,7 @@ class NoDuplicates(Rule):
     name = "no duplicates"
     promise = "No rejection, rewire or link occurs twice in an iteration."
     needs = ANY_PART
+    assumes = ("times",)
 
     def window(self, events: Events, contract: Contract) -> None:
         for kind, fields in (

@@ -59,6 +59,7 @@ class Turns(IterationRule):
 class Steering(IterationRule):
     name = "steering"
     promise = "Trees grow straight from the node nearest to the target, by at most a step."
+    assumes = ("motions", "samples", "times")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -175,7 +176,7 @@ class GoalAttempts(IterationRule):
         tried = (after["kind"] == Kind.REJECT) & (after["why"] == Reason.GOAL_BLOCKED)
         tried &= after["node"] == rows["node"]
         tried |= (after["kind"] == Kind.EDGE) & (after["parent"] == rows["node"])
-        tried |= (after["kind"] == Kind.PATH) & (far == 0)
+        tried |= (after["kind"] == Kind.PATH) & (far <= context.claims.goal_tolerance)
         limit = (contract.step or 0.0) * (1 - CLOSE) - context.tolerance
         due = (rows["kind"] == Kind.EDGE) & (contract.line_of_sight | (far < limit))
         over = np.isin(after["kind"], [Kind.SAMPLE, Kind.PHASE, Kind.REJECT, Kind.PATH])

@@ -66,6 +66,7 @@ class JoinedRule(Rule):
 
     needs = "near"
     kind = Kind.EDGE
+    assumes = ("motions", "costs", "times")
 
     def finish(self) -> None:
         """Judge the nodes of each tree by the contract under which they joined."""
@@ -167,6 +168,7 @@ class PathsReported(Rule):
     promise = "Whenever the trees hold a path better than the best reported one, it is reported."
     needs = "near"
     kind = Kind.EDGE
+    assumes = ("motions", "costs", "times")
 
     def finish(self) -> None:
         context, edges = self.context, self.context.events[Kind.EDGE]

@@ -1,5 +1,8 @@
 """Rules about trees: nodes and parents, costs at every moment, rewires, links."""
 
+from abc import abstractmethod
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,16 +38,24 @@ class Nodes(TreeRule):
 
 class Roots(TreeRule):
     name = "roots"
-    promise = "A tree has one root, its first node, at cost 0: the start, or in tree 1 the goal."
+    promise = (
+        "A tree has one root, its first node, at cost 0 if costs are lengths: the start, or in "
+        "tree 1 the goal."
+    )
 
     def judge_tree(self, tree: TreeHistory) -> None:
         is_root = tree.edges["parent"] < 0
         first = np.arange(len(tree)) == 0
         edges, rightly = tree.edges[is_root | first], (is_root & first)[is_root | first]
-        wrong = ~rightly | (edges["cost"] != 0)
-        wanted = {0: self.context.start, 1: self.context.goal}.get(tree.number)
+        context = self.context
+        wrong = ~rightly | ((edges["cost"] != 0) & (context.claims.costs == "length"))
+        wanted = {0: context.start, 1: context.goal}.get(tree.number)
         if wanted is not None:
-            wrong |= (edges["q"] != wanted).any(axis=1)
+            off = (edges["q"] != wanted).any(axis=1)
+            if tree.number == 1 and context.claims.goal_tolerance:
+                far = context.distance(edges["q"], wanted[None])
+                off &= ~context.at_most(far, context.claims.goal_tolerance)
+            wrong |= off
         self.judge(
             edges, wrong,
             lambda i: (
@@ -83,22 +94,31 @@ class EdgeLengths(TreeRule):
 
 
 class CostRule(TreeRule):
-    """A rule that judges the costs that events state."""
+    """A rule that judges the costs that events state.
+
+    Where the planner's motions are its own, these are at least as long as the distance.
+    """
 
     def judge_costs(self, table: Table, cost: Floats) -> None:
         """Judge the stated costs of events by the right ones, shape (n,)."""
         stated = np.asarray(table["cost"])
         self.judge(
-            table, ~self.context.equal(stated, cost),
+            table, ~self.context.right_cost(stated, cost),
             lambda i: f"node {table['node'][i]} costs {cost[i]:.12g}, not {stated[i]:.12g}",
         )  # fmt: skip
 
 
 class EdgeCosts(CostRule):
     name = "edge costs"
-    promise = "A node's cost is its parent's at that moment plus the distance between them."
+    promise = (
+        "A node's cost is its parent's at that moment plus the distance between them; no less if "
+        "motions are own."
+    )
+    assumes = ("costs",)
 
     def judge_tree(self, tree: TreeHistory) -> None:
+        if len(tree.rewires) and "times" in self.context.unknown:
+            return  # what the parent cost at that moment is not known
         connected, cost = tree.of_edges(tree.connected), tree.of_edges(tree.new_cost)
         for chunk in tree.chunks():
             self.judge_costs(tree.edges[chunk][connected[chunk]], cost[chunk][connected[chunk]])
@@ -107,6 +127,7 @@ class EdgeCosts(CostRule):
 class EdgesFree(TreeRule):
     name = "edges free"
     promise = "Every edge of a tree is free of obstacles."
+    assumes = ("motions", "edges", "collisions")
 
     def judge_tree(self, tree: TreeHistory) -> None:
         connected = tree.of_edges(tree.connected)
@@ -132,6 +153,7 @@ class RewireCosts(CostRule):
     name = "rewire costs"
     promise = "A rewired node's cost is its new parent's at that moment plus the distance."
     kind = None
+    assumes = ("costs", "times")
 
     def judge_tree(self, tree: TreeHistory) -> None:
         valid = tree.of_rewires(tree.connected)
@@ -142,11 +164,14 @@ class RewiresGain(TreeRule):
     name = "rewires gain"
     promise = "A rewire never raises the cost of its node."
     kind = None
+    assumes = ("times",)
 
     def judge_tree(self, tree: TreeHistory) -> None:
         valid = tree.of_rewires(tree.connected)
         table, before = tree.rewires[valid], tree.of_rewires(tree.fold.before)[valid]
         after = tree.of_rewires(tree.new_cost)[valid]
+        if not {"motions", "costs"}.isdisjoint(self.context.unknown):
+            before, after = tree.of_rewires(tree.stated_before)[valid], np.asarray(table["cost"])
         self.judge(
             table, ~self.context.at_most(after, before),
             lambda i: f"the cost of node {table['node'][i]} rises to {after[i]:.12g}"
@@ -159,6 +184,7 @@ class RewiresNear(TreeRule):
     promise = "A rewire's new parent is within the radius of the contract."
     needs = "near"
     kind = None
+    assumes = ("times",)
 
     def judge_tree(self, tree: TreeHistory) -> None:
         valid = tree.of_rewires(tree.connected)
@@ -178,40 +204,50 @@ class RewiresFree(TreeRule):
     name = "rewires free"
     promise = "The edge to a new parent is free of obstacles."
     kind = None
+    assumes = ("motions", "edges", "collisions")
 
     def judge_tree(self, tree: TreeHistory) -> None:
         table = tree.rewires[tree.of_rewires(tree.connected)]
         self.judge_free(table, tree.q[table["parent"]], tree.q[table["node"]], *_EDGE)
 
 
-class Links(Rule):
-    name = "links"
-    promise = (
-        "A link joins existing nodes, is free and no longer than stated, and its cost is correct."
-    )
+class LinkEnds(NamedTuple):
+    """The links between existing nodes.
+
+    Attributes:
+        table: Their events, shape (n,).
+        a: Where they begin, in tree 0, shape (n, dof).
+        b: Where they end, in tree 1, shape (n, dof).
+        through: What the two nodes cost together, shape (n,).
+        length: Distances between them, shape (n,).
+    """
+
+    table: Table
+    a: Floats
+    b: Floats
+    through: Floats
+    length: Floats
+
+
+class LinkRule(Rule):
+    """A rule about links between two trees."""
 
     def finish(self) -> None:
-        context, links = self.context, self.context.events[Kind.CONNECT]
+        """Judge the links between existing nodes."""
+        links = self.context.events[Kind.CONNECT]
         (a, cost_a), (b, cost_b) = self._ends(0, links, "node"), self._ends(1, links, "other")
         exist = np.isfinite(cost_a) & np.isfinite(cost_b)
-        self.judge(
-            links, ~exist,
-            lambda i: f"nodes {links['node'][i]} and {links['other'][i]} do not both exist",
-        )  # fmt: skip
-        table, a, b = links[exist], a[exist], b[exist]
-        length = context.distance(a, b)
-        cost = (cost_a + cost_b)[exist] + length
-        limit = context.limits(table, lambda contract: contract.link)
-        if np.isfinite(limit).any():
-            self.judge(
-                table, ~context.at_most(length, limit),
-                lambda i: f"a link of {length[i]:.12g}; the limit is {limit[i]:.12g}",
-            )  # fmt: skip
-        self.judge(
-            table, ~context.equal(np.asarray(table["cost"]), cost),
-            lambda i: f"costs {cost[i]:.12g}, not {table['cost'][i]:.12g}",
-        )  # fmt: skip
-        self.judge_free(table, a, b, "link")
+        self.judge_lost(links, ~exist)
+        a, b = a[exist], b[exist]
+        through, length = (cost_a + cost_b)[exist], self.context.distance(a, b)
+        self.judge_links(LinkEnds(links[exist], a, b, through, length))
+
+    def judge_lost(self, links: Table, lost: NDArray[np.bool_]) -> None:
+        """Judge links of which some are between nodes that do not exist."""
+
+    @abstractmethod
+    def judge_links(self, links: LinkEnds) -> None:
+        """Judge links."""
 
     def _ends(self, number: int, links: Table, name: str) -> tuple[Floats, Floats]:
         """Return the ends of links in a tree, and their costs; nan where they do not exist."""
@@ -225,7 +261,49 @@ class Links(Rule):
         return q, cost
 
 
+class Links(LinkRule):
+    name = "links"
+    promise = "A link joins existing nodes, and is no longer than stated."
+
+    def judge_lost(self, links: Table, lost: NDArray[np.bool_]) -> None:
+        self.judge(
+            links, lost,
+            lambda i: f"nodes {links['node'][i]} and {links['other'][i]} do not both exist",
+        )  # fmt: skip
+
+    def judge_links(self, links: LinkEnds) -> None:
+        table, length = links.table, links.length
+        limit = self.context.limits(table, lambda contract: contract.link)
+        if np.isfinite(limit).any():
+            self.judge(
+                table, ~self.context.at_most(length, limit),
+                lambda i: f"a link of {length[i]:.12g}; the limit is {limit[i]:.12g}",
+            )  # fmt: skip
+
+
+class LinkCosts(LinkRule):
+    name = "link costs"
+    promise = "A link's cost is that of its nodes at that moment plus the distance between them."
+    assumes = ("costs", "times")
+
+    def judge_links(self, links: LinkEnds) -> None:
+        stated, cost = np.asarray(links.table["cost"]), links.through + links.length
+        self.judge(
+            links.table, ~self.context.right_cost(stated, cost),
+            lambda i: f"costs {cost[i]:.12g}, not {stated[i]:.12g}",
+        )  # fmt: skip
+
+
+class LinksFree(LinkRule):
+    name = "links free"
+    promise = "Every link between two trees is free of obstacles."
+    assumes = ("motions", "edges", "collisions")
+
+    def judge_links(self, links: LinkEnds) -> None:
+        self.judge_free(links.table, links.a, links.b, "link")
+
+
 RULES = (
-    Nodes, Roots, EdgeLengths, EdgeCosts, EdgesFree,
-    Rewires, RewireCosts, RewiresGain, RewiresNear, RewiresFree, Links,
+    Nodes, Roots, EdgeLengths, EdgeCosts, EdgesFree, Rewires, RewireCosts, RewiresGain,
+    RewiresNear, RewiresFree, Links, LinkCosts, LinksFree,
 )  # fmt: skip

@@ -45,6 +45,7 @@ class CellsOnLattice(Rule):
     promise = "Every cell is a whole number of edges from the start along each axis."
     needs = "lattice"
     kind = Kind.EXPAND
+    assumes = ("motions",)
 
     def finish(self) -> None:
         lattice = self.context.contract.lattice
@@ -186,6 +187,7 @@ class Estimates(Rule):
     name = "estimates"
     promise = "An estimate of the cost-to-go begins as the distance to the goal and only rises."
     needs = "lattice"
+    assumes = ("costs",)
 
     def finish(self) -> None:
         context, table = self.context, self.context.events[Kind.HEURISTIC]
@@ -209,6 +211,7 @@ class EstimatesAdmissible(Rule):
     name = "estimates admissible"
     promise = "No estimate exceeds the cost of a path to the goal that the log contains."
     needs = "lattice"
+    assumes = ("motions", "costs", "collisions")
 
     def finish(self) -> None:
         context, lattice = self.context, self.context.contract.lattice

@@ -25,6 +25,7 @@ class Choices(Rule):
     promise = "With a lookahead of 1 each move is to a free neighbour of least cost and estimate."
     needs = "lattice"
     kind = Kind.EXPAND
+    assumes = ("motions", "costs", "collisions")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

@@ -245,7 +245,7 @@ class GoalReached(LatticeRule):
         """Judge whether paths end with a move of the allowed length, or between neighbours."""
         context = self.context
         for event, path in context.planned_paths:
-            if len(path) == 1:
+            if len(path) < 2:
                 continue
             last = path[-2:]
             cells, far = indices(context, lattice, last), context.distance(last[:1], last[1:])

@@ -93,8 +93,8 @@ DOCTORED: list[Doctored] = [
     ("link attempts", "", lambda: not_reported(planned("bi-rrt-star")), {"extensions"}),
     ("meetings", "not newest", lambda: older_node(short("blocked")), {"reasons", "rejections"}),
     ("meetings", "", lambda: unseen_link(short("blocked")), set()),
-    ("meetings", "", lambda: older_link(short("blocked")), {"links", "paths in trees",
-     "paths reported"}),
+    ("meetings", "", lambda: older_link(short("blocked")), {"links", "link costs",
+     "links free", "paths in trees", "paths reported"}),
     ("meetings", "", lambda: short("blocked").judged_by(link=60.0), set()),
 ]  # fmt: skip
 

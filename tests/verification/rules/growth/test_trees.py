@@ -76,6 +76,17 @@ def emptied(case: Case) -> Case:
     return replace(case, world=replace(case.world, balls=np.empty((0, 3))))
 
 
+def on_link(case: Case) -> Case:
+    """Put a tiny ball on a link."""
+    link = case.log[Kind.CONNECT][0]
+    ends = [
+        edges["q"][edges["tree"] == tree][int(link[name])]
+        for tree, name in ((0, "node"), (1, "other"))
+        for edges in [case.log[Kind.EDGE]]
+    ]
+    return case.with_ball((ends[0] + ends[1]) / 2)
+
+
 DOCTORED: list[Doctored] = [
     ("nodes", "", on("rrt", leaf_edge(parent=10**6)), set()),
     ("nodes", "", on("rrt", leaf_edge(node=10**6)), set()),
@@ -99,7 +110,8 @@ DOCTORED: list[Doctored] = [
     ("rewires gain", "", on("star", dearer_rewire), set()),
     ("rewires near", "", on("star", lambda c: c.judged_by(near=Near(1.0, 1.0, 2))), set()),
     ("rewires free", "", on("star", on_rewire), set()),
-    ("links", "", on("pair", shifted(Kind.CONNECT, "cost", 0, 1e-6)), set()),
+    ("link costs", "", on("pair", shifted(Kind.CONNECT, "cost", 0, 1e-6)), set()),
+    ("links free", "hits ball", on("pair", on_link), {"paths free"}),
     ("links", "", on("pair", lambda c: c.judged_by(link=0.01)), set()),
     ("links", "", on("pair", lambda c: c.edit(Kind.CONNECT, 0, other=10**6)), {"paths in trees"}),
 ]  # fmt: skip
