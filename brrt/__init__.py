@@ -63,6 +63,8 @@ _MODULES = {
     "Finding": "verification.result",
     "Verification": "verification.verification",
     "verify": "verification.verification",
+    "PathCheck": "verification.path_check",
+    "check_path": "verification.path_check",
     "Explanation": "explanation",
     "explain": "explanation",
     "plot": "views.matplotlib.figure",

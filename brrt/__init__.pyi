@@ -45,6 +45,8 @@ from brrt.scenario.manifest import Manifest as Manifest
 from brrt.scenario.scenario import Scenario as Scenario
 from brrt.testing.gate import Verdict as Verdict
 from brrt.testing.gate import gate as gate
+from brrt.verification.path_check import PathCheck as PathCheck
+from brrt.verification.path_check import check_path as check_path
 from brrt.verification.result import Finding as Finding
 from brrt.verification.verification import Verification as Verification
 from brrt.verification.verification import verify as verify

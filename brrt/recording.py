@@ -76,6 +76,33 @@ class Recording:
         """Return the robot of the run, with all its settings resolved in the world."""
         return self.manifest.make_robot().resolved(self.world)
 
+    def to_pandas(self, **instant: Any) -> dict[str, Any]:
+        """Return the run as data frames by name: one for each kind of event, nodes, best path.
+
+        Args:
+            instant: `time`, `event` or `iteration`, as `brrt.snapshot` takes them.
+
+        Raises:
+            BrrtError: pandas is missing, or the instant is wrong.
+        """
+        from brrt.exports.frames import to_pandas  # noqa: PLC0415 - it imports this module
+
+        return to_pandas(self, **instant)
+
+    def to_networkx(self, **instant: Any) -> Any:
+        """Return the trees, or the cells of a search, as a `networkx.DiGraph`.
+
+        Args:
+            instant: `time`, `event` or `iteration`, as `brrt.snapshot` takes them.
+
+        Raises:
+            BrrtError: networkx is missing, or the instant is wrong.
+            LogError: The events do not make trees.
+        """
+        from brrt.exports.graphs import to_networkx  # noqa: PLC0415 - it imports this module
+
+        return to_networkx(self, **instant)
+
 
 class Memory:
     """A sink that keeps every batch.

@@ -1,5 +1,6 @@
 """`brrt verify`: whether a recording keeps what its planner promises."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from textwrap import TextWrapper
@@ -10,7 +11,7 @@ import typer
 from brrt.shell import file_word, join
 
 from .console import Code, announce_compilation, note, print_json, print_line, print_lines
-from .options import Json, Run
+from .options import Force, Json
 from .progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -23,8 +24,13 @@ _SHOWN = 3
 _WIDTH = 80
 
 
+_ALONE = "A path alone"
+
+
 def verify(
-    run: Run,
+    run: Annotated[
+        Path | None, typer.Argument(help="A recording, .mcap or .rrd.", show_default=False)
+    ] = None,
     as_json: Json = False,
     partial: Annotated[
         bool,
@@ -44,14 +50,46 @@ def verify(
         float | None,
         typer.Option(
             help="With --rerun: by how much numbers may differ, relative to the greater one, or "
-            "to 1 if both are less. Default 1e-9; 0 compares every bit.",
+            "to 1 if both are less. Default 1e-9; 0 compares every bit. With --path: how far its "
+            "ends may be from start and goal. Default 0.",
         ),
     ] = None,
     long: Annotated[
         bool, typer.Option("--long", help="Print each promise in full, below its rule.")
     ] = False,
+    path: Annotated[
+        Path | None,
+        typer.Option(
+            help="Judge a path instead of a recording: a .csv, .txt, .json or .npy file with one "
+            "configuration a row, columns by name or in the robot's order.",
+            rich_help_panel=_ALONE,
+        ),
+    ] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(help="The world that it leads through, as in plan.", rich_help_panel=_ALONE),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(help="The robot, as in plan. Default point.", rich_help_panel=_ALONE),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="Where it must begin.", metavar="X,Y[,Z]", rich_help_panel=_ALONE),
+    ] = None,
+    goal: Annotated[
+        str | None,
+        typer.Option(help="Where it must end.", metavar="X,Y[,Z]", rich_help_panel=_ALONE),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Draw it into a .png, .svg or .pdf file.", rich_help_panel=_ALONE
+        ),
+    ] = None,
+    force: Force = False,
 ) -> None:
-    """Check whether a recording keeps what its planner promises.
+    """Check whether a recording keeps what its planner promises, or a path is free.
 
     The rules share no code with the planners. Exit code 0: all rules hold; 1:
     one is broken. Tests of whether draws are uniform, and as biased as stated,
@@ -62,14 +100,30 @@ def verify(
     brrt verify run.mcap --long
 
     brrt verify run.mcap --rerun
+
+    brrt verify --path path.csv --world map.yaml --robot lorry.json
     """
     from brrt.errors import BrrtError
+
+    alone = {"--world": world, "--robot": robot, "--start": start, "--goal": goal, "--out": picture}
+    of_run = {"a recording": run, "--partial": partial, "--rerun": rerun, "--long": long}
+    _check_fit(path, alone, of_run)
+    if tolerance is not None and (not (rerun or path) or not tolerance >= 0):
+        raise BrrtError("--tolerance must be a number from 0 on, and needs --rerun or --path")
+    if path is not None:
+        from .path import judge_path
+
+        ends = {"start": start, "goal": goal}
+        judge_path(
+            path, world, robot or "point", ends, tolerance, picture, force=force, as_json=as_json
+        )
+        return
+    if run is None:
+        raise BrrtError("name a recording, or a path with --path path.csv --world map.yaml")
     from brrt.verification.verification import verify
 
     from .run_file import open_run
 
-    if tolerance is not None and (not rerun or not tolerance >= 0):
-        raise BrrtError("--tolerance must be a number from 0 on, and needs --rerun")
     recording = open_run(run, partial=partial)
     if partial and _lacks_events(recording):
         recording = replace(recording, result=None)
@@ -98,6 +152,20 @@ def verify(
             _show_again(again)
     if not found.holds or (again is not None and not again.equal):
         raise typer.Exit(Code.FAILED)
+
+
+def _check_fit(path: Path | None, alone: Mapping[str, Any], of_run: Mapping[str, Any]) -> None:
+    """Check that only options are given that go with a path, or with a recording.
+
+    Raises:
+        BrrtError: An option is given that does not.
+    """
+    from brrt.errors import BrrtError
+
+    for name, value in (alone if path is None else of_run).items():
+        if value:
+            side = "needs --path" if path is None else "does not go with --path"
+            raise BrrtError(f"{name} {side}; leave it out or see brrt verify --help")
 
 
 def _lacks_events(recording: "Recording") -> bool:

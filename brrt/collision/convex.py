@@ -79,6 +79,20 @@ def separation(
     return best, axis
 
 
+def distances(
+    one: Complex, normals: Complex, other: Complex, others: Complex
+) -> tuple[Floats, Complex]:
+    """Return distances as `separation` does, where shapes are disjoint those of nearest points."""
+    apart, axis = separation(one, normals, other, others)
+    best = np.full(len(apart), np.inf)
+    for points, shape, sides, sign in ((one, other, others, -1), (other, one, normals, 1)):
+        for point in points:
+            gap, way = from_point(shape, sides, point)
+            nearer = (gap < best) & (apart >= 0)
+            best, axis = np.where(nearer, gap, best), np.where(nearer, sign * way, axis)
+    return np.where(apart < 0, apart, best), axis
+
+
 def from_point(shape: Complex, normals: Complex, point: Complex) -> tuple[Floats, Complex]:
     """Return distances of points from shapes, below 0 inside, and the direction to the point.
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.collision.bodies import Body, Placed, towards
-from brrt.collision.convex import Complex, along, from_point, separation
+from brrt.collision.convex import Complex, along, distances, from_point, separation
 from brrt.collision.obstacles import Obstacles, near_pairs
 from brrt.robots import Chain, Polygon
 
@@ -31,9 +31,12 @@ DEPTH = 1e-9
 MARGIN = 2e-6
 """A motion may be rejected if it comes closer than this part of the map's longest side."""
 
+FARTHEST = 1e6
+"""Motions farther from the origin than so many sizes of the map are not bisected."""
+
 _MOTIONS, _PIECES = 2048, 30_000
 
-_STEPS = 1 << (HALVINGS + 1)
+STEPS = 1 << (HALVINGS + 1)
 """Middles of pieces are multiples of one part in so many."""
 
 
@@ -50,12 +53,12 @@ def swept_clear(obstacles: Obstacles, robot: Any, a: Floats, b: Floats) -> Flags
 
 
 @dataclass(slots=True)
-class _Pieces:
+class Pieces:
     """Pieces of motions, each with a part of the body and what that may hit; shapes (n,).
 
     Attributes:
         motion: Number of the motion.
-        middle: Middle of the piece, from 0 at the motion's begin to `_STEPS` at its end.
+        middle: Middle of the piece, from 0 at the motion's begin to `STEPS` at its end.
         part: Part of the body.
         other: An obstacle, `Obstacles.bounds`, or `Obstacles.itself`.
         mate: The part that it may hit, if that is the body itself.
@@ -71,16 +74,16 @@ class _Pieces:
     move: Floats
     bend: Floats
 
-    def __getitem__(self, rows: Any) -> "_Pieces":
-        return _Pieces(*(getattr(self, name)[rows] for name in self.__slots__))
+    def __getitem__(self, rows: Any) -> "Pieces":
+        return Pieces(*(getattr(self, name)[rows] for name in self.__slots__))
 
     def __len__(self) -> int:
         return len(self.motion)
 
-    def halves(self, level: int) -> "_Pieces":
+    def halves(self, level: int) -> "Pieces":
         """Return the halves of pieces of a level."""
         both = self[np.tile(np.arange(len(self)), 2)]
-        quarter = _STEPS >> (level + 2)
+        quarter = STEPS >> (level + 2)
         both.middle += np.repeat([-quarter, quarter], len(self))
         return both
 
@@ -102,11 +105,11 @@ def _sweep(
     body, step = Body(robot, a.shape[1]), towards(robot, a, b)
     # The rule on bounds finds what is not a number, or so far away that bisection has no end.
     sane = np.isfinite(step).all(axis=1) & np.isfinite(a).all(axis=1)
-    sane &= (np.abs(a) < 1e6 * (1 + obstacles.extent)).all(axis=1)
+    sane &= (np.abs(a) < FARTHEST * (1 + obstacles.extent)).all(axis=1)
     rows = np.flatnonzero(sane)
     for first in range(0, len(rows), _MOTIONS):
         some = rows[first : first + _MOTIONS]
-        whole = _whole_motions(obstacles, body, a[some], b[some], step[some], clear)
+        whole = whole_motions(obstacles, body, a[some], b[some], step[some], clear)
         whole.motion = some[whole.motion]
         stack = [(0, whole)]
         while stack:
@@ -117,7 +120,7 @@ def _sweep(
                 continue
             if not len(pieces):
                 continue
-            apart, least = _Place(obstacles, body, a, step, pieces).gaps(0.5 ** (level + 1))
+            apart, least = Place(obstacles, body, a, step, pieces).gaps(0.5 ** (level + 1))
             met = apart < touch
             hit[pieces.motion[met]] = pieces.other[met]
             left = pieces[~met & ~(least > clear)]
@@ -128,14 +131,14 @@ def _sweep(
     return hit, undecided
 
 
-def _whole_motions(
+def whole_motions(
     obstacles: Obstacles, body: Body, a: Floats, b: Floats, step: Floats, clear: float
-) -> _Pieces:
+) -> Pieces:
     """Return whole motions, each with every part and all that the part may hit."""
     n, parts, bounds = len(a), len(body.hulls), body.bounds(a, b, step)
     motion, part = (x.reshape(-1) for x in np.mgrid[:n, :parts])
     all_parts = _pieces(motion, part, 0, 0, bounds.move, bounds.bend)
-    low, high = _Place(obstacles, body, a, step, all_parts).boxes(clear)
+    low, high = Place(obstacles, body, a, step, all_parts).boxes(clear)
     found = list(near_pairs(low, high, obstacles)) if len(obstacles) else []
     wall = np.flatnonzero(
         (low < obstacles.walls[0]).any(axis=1) | (high > obstacles.walls[1]).any(axis=1)
@@ -149,25 +152,25 @@ def _whole_motions(
     motion, pair = (x.reshape(-1) for x in np.mgrid[:n, : len(body.pairs)])
     one, two = body.pairs[pair].T
     own = _pieces(motion, one, obstacles.itself, two, seen.move, seen.bend)
-    own = own[_Place(obstacles, body, a, step, own).close(clear)]
+    own = own[Place(obstacles, body, a, step, own).close(clear)]
     both = zip(*([getattr(x, name) for name in x.__slots__] for x in (pieces, own)), strict=True)
-    return _Pieces(*map(np.concatenate, both))
+    return Pieces(*map(np.concatenate, both))
 
 
 def _pieces(
     motion: Ints, part: Ints, other: int, mate: Ints | int, move: Floats, bend: Floats
-) -> _Pieces:
+) -> Pieces:
     """Return whole motions as pieces."""
     n = len(motion)
-    middle, others = np.full(n, _STEPS // 2), np.full(n, other)
+    middle, others = np.full(n, STEPS // 2), np.full(n, other)
     mates = np.broadcast_to(mate, n).astype(np.int64)
-    return _Pieces(
+    return Pieces(
         motion, middle, part, others, mates, move.reshape(-1),
         np.broadcast_to(bend, move.shape).reshape(-1),
     )  # fmt: skip
 
 
-class _Place:
+class Place:
     """The body in the middle of each piece.
 
     Args:
@@ -176,16 +179,19 @@ class _Place:
         a: Where all motions begin.
         step: How far they lead.
         pieces: The pieces.
+        exact: Whether distances from polygons are exact, and not lower bounds that take less time.
     """
 
     def __init__(
-        self, obstacles: Obstacles, body: Body, a: Floats, step: Floats, pieces: _Pieces
-    ) -> None:
+        self, obstacles: Obstacles, body: Body, a: Floats, step: Floats, pieces: Pieces,
+        *, exact: bool = False,
+    ) -> None:  # fmt: skip
         self.obstacles, self.body, self.pieces = obstacles, body, pieces
+        self._apart = distances if exact else separation
         # Many pieces share a place, and so the poses of the body there.
-        places, self.rows = np.unique(pieces.motion * _STEPS + pieces.middle, return_inverse=True)
-        motion, middle = places // _STEPS, places % _STEPS
-        self.Q = a[motion] + (middle / _STEPS)[:, None] * step[motion]
+        places, self.rows = np.unique(pieces.motion * STEPS + pieces.middle, return_inverse=True)
+        motion, middle = places // STEPS, places % STEPS
+        self.Q = a[motion] + (middle / STEPS)[:, None] * step[motion]
         self.known = isinstance(body.robot, Chain | Polygon)
         if self.known:
             self.poses = body.poses(self.Q, step[motion])
@@ -247,7 +253,7 @@ class _Place:
         j, shapes = self.pieces.other[rows], self.obstacles.shapes
         part = self.placed(rows, self.pieces.part[rows])
         other = shapes.vertices[:, j], shapes.axes[:, j]
-        gap, axis = separation(part.vertices, part.axes, *other)
+        gap, axis = self._apart(part.vertices, part.axes, *other)
         return gap, self._least(rows, half, part.vertices, part.velocity, gap, axis)
 
     def _from_balls(self, rows: Ints, half: float) -> tuple[Floats, Floats]:

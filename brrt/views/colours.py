@@ -69,6 +69,7 @@ PAPER_GOAL: Colour = (24, 150, 62)
 PAPER_PATH: Colour = (216, 164, 0)
 PAPER_SMOOTHED: Colour = (168, 110, 0)
 PAPER_REJECTED: Colour = (178, 120, 124)
+PAPER_HIT: Colour = (206, 38, 46)
 PAPER_ROBOT: Colour = (20, 22, 28)
 PAPER_TREES: Mapping[int, tuple[str, Colour, Colour]] = {
     0: ("start", (38, 104, 214), (0, 158, 190)),

@@ -1,0 +1,1 @@
+"""Runs as data for other programs: tables and graphs, at any instant."""
