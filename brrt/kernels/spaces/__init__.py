@@ -29,6 +29,10 @@ def make_space(robot: Robot, world: World) -> Any:
     Raises:
         BrrtError: No space is registered for the robot.
     """
+    if robot.opaque:
+        raise BrrtError(
+            f"robot {robot.kind} cannot plan: its shape is unknown; choose point, polygon or chain"
+        )
     build = SPACES.get(type(robot))
     if build is None:
         raise BrrtError(
