@@ -62,12 +62,7 @@ def graph_of(run: Snapshot) -> Graph:
     row = {key: i for i, key in enumerate(zip(tree.tolist(), node.tolist(), strict=True))}
     above = zip(tree.tolist(), parent.tolist(), strict=True)
     edges = [(row[key], child) for child, key in enumerate(above) if key in row]
-    links = [
-        (row[ends[0]], row[ends[1]])
-        for link in run.events[Kind.CONNECT]
-        for ends in [((0, int(link["node"])), (1, int(link["other"])))]
-        if ends[0] in row and ends[1] in row
-    ]
+    links = [(row[a], row[b]) for a, b in _links(run) if a in row and b in row]
     source, target = np.array([*edges, *links], np.int64).reshape(-1, 2).T
     q = np.stack([nodes[name] for name in nodes if name.startswith("q_")], axis=-1)
     kinds = np.array(["edge"] * len(edges) + ["link"] * len(links), object)
@@ -77,6 +72,15 @@ def graph_of(run: Snapshot) -> Graph:
         {name: column for name, column in nodes.items() if name != "parent"},
         {"source": source, "target": target, "kind": kinds, "length": lengths},
     )
+
+
+def _links(run: Snapshot) -> Iterator[tuple[Node, Node]]:
+    """Yield the ends of edges beside those to parents: between two trees, and of graphs."""
+    for link in run.events[Kind.CONNECT]:
+        yield (0, int(link["node"])), (1, int(link["other"]))
+    for number, tree in run.forest.items():
+        for link in getattr(tree, "links", ()):
+            yield (number, int(link["node"])), (number, int(link["other"]))
 
 
 def _cells(run: Snapshot, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:

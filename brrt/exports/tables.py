@@ -73,7 +73,7 @@ def coordinate_names(recording: Recording) -> tuple[str, ...]:
 
 
 def node_columns(snapshot: Snapshot, coordinates: tuple[str, ...]) -> Columns:
-    """Return the nodes of all trees; no columns if there is no tree.
+    """Return the nodes of all trees, removed ones left out; no columns if there is no tree.
 
     Raises:
         LogError: The events do not make trees.
@@ -81,16 +81,15 @@ def node_columns(snapshot: Snapshot, coordinates: tuple[str, ...]) -> Columns:
     trees = snapshot.forest
     if not trees:
         return {}
-    each = [(np.full(len(tree), number), np.arange(len(tree))) for number, tree in trees.items()]
-    numbers, nodes = (np.concatenate(column) for column in zip(*each, strict=True))
-    return {
-        "tree": numbers,
-        "node": nodes,
-        "parent": np.concatenate([tree.parent for tree in trees.values()]),
-        "cost": np.concatenate([tree.cost for tree in trees.values()]),
-        "seq": np.concatenate([tree.born for tree in trees.values()]),
-        **_split("q", np.concatenate([tree.q for tree in trees.values()]), coordinates),
-    }
+    parts = []
+    for number, tree in trees.items():
+        rows = np.setdiff1d(np.arange(len(tree)), getattr(tree, "removed", ()))
+        parts.append({
+            "tree": np.full(len(rows), number), "node": rows, "parent": tree.parent[rows],
+            "cost": tree.cost[rows], "seq": tree.born[rows],
+            **_split("q", tree.q[rows], coordinates),
+        })  # fmt: skip
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def _event_columns(kind: Kind, table: Table, coordinates: tuple[str, ...]) -> Columns:

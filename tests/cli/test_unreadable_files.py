@@ -71,7 +71,8 @@ READERS = (
     (".map", "worlds", "show", "{}"), (".json", "plan", "--robot", "{}"),
     (".robot", "plan", "--robot", "./{}"), (".mcap", "plan", "--from", "{}"),
     (".mcap", "recover", "{}", "--out", "x.mcap"),
-    (".mcap", "export", "{}", "--foxglove", "x.mcap"),
+    (".mcap", "export", "{}", "--foxglove", "x.mcap"), (".mcap", "export", "{}", "--csv", "c"),
+    *((suffix, "verify", "--path", "{}", "--world", "empty2d") for suffix in (".csv", ".npy")),
 )  # fmt: skip
 
 

@@ -18,6 +18,8 @@ script.load()(sys.argv[1:])
 """
 GOLDEN, OTHER = (str(RECORDINGS / f"circles2d-{name}.mcap") for name in ("rrt", "rrt-star"))
 
+PATH = "path.csv"
+
 
 def blocked(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a command in a process in which importing numba raises."""
@@ -42,6 +44,8 @@ def blocked(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         (("explain", OTHER), 0),
         (("view", "--help"), 0),
         (("export", GOLDEN, "--foxglove", "viz.mcap"), 0),
+        (("export", OTHER, "--csv", "c", "--graphml", "g.graphml", "--at-iteration", "99"), 0),
+        (("verify", "--path", PATH, "--world", "circles2d:n=20,seed=3"), 1),
         (("recover", GOLDEN, "--out", "whole.mcap"), 0),
         (("robots",), 0),
         (("worlds", "show", "circles2d:n=5"), 0),
@@ -49,6 +53,7 @@ def blocked(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 )
 def test_reading_needs_no_compiler(arguments: tuple[str, ...], code: int, tmp_path: Path) -> None:
     """Each command does its work."""
+    (tmp_path / PATH).write_text("5,5\n40,9\n")
     done = blocked(tmp_path, *arguments)
     assert (done.returncode, done.stderr) == (code, "")
     assert done.stdout
