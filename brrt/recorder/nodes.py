@@ -22,6 +22,7 @@ class Nodes:
     Attributes:
         parent: Their parents; -1 for a root.
         cost: Their costs now, as far as they are connected; see `cost_of`.
+        loose: Nodes without a parent that are no roots: they and what is below have no cost.
         removed: Nodes that were removed.
         rows: For `Recorder.tree`: number of the node in each row of the caller's arrays.
     """
@@ -31,8 +32,7 @@ class Nodes:
         self._q, self.parent, self.cost = array("d"), array("q"), array("d")
         # The children of each node; None until a rewire needs them.
         self._children: list[set[int]] | None = None
-        # Nodes without a parent that are no roots: neither they nor what is below have a cost.
-        self._loose: set[int] = set()
+        self.loose: set[int] = set()
         self.removed: set[int] = set()
         # The links, as pairs in order; those of arrays wait until a cut needs them.
         self._links: set[tuple[int, int]] = set()
@@ -51,14 +51,9 @@ class Nodes:
         """Return the configuration of a node."""
         return self._q[node * self._dof : (node + 1) * self._dof]
 
-    @property
-    def has_loose(self) -> bool:
-        """Whether nodes may have no cost."""
-        return bool(self._loose)
-
     def cost_of(self, node: int) -> float:
         """Return a node's cost-to-come; infinite if no root is above it."""
-        return math.inf if self._loose and self.root(node) in self._loose else self.cost[node]
+        return math.inf if self.loose and self.root(node) in self.loose else self.cost[node]
 
     def root(self, node: int) -> int:
         """Return the node without a parent that is above a node, or is it."""
@@ -84,14 +79,14 @@ class Nodes:
 
     def join_vertex(self, q: Sequence[float]) -> None:
         """Add a node that is no root and has no parent."""
-        self._loose.add(len(self))
+        self.loose.add(len(self))
         self.join(q, -1, 0.0)
 
     def join_vertices(self, q: Floats) -> None:
         """Add nodes that are no roots and have no parent."""
         first = len(self)
         self.join_many(q, np.full(len(q), -1), np.zeros(len(q)))
-        self._loose.update(range(first, first + len(q)))
+        self.loose.update(range(first, first + len(q)))
 
     def children(self) -> list[set[int]]:
         """Return the children of each node."""
@@ -109,7 +104,7 @@ class Nodes:
             children[self.parent[node]].discard(node)
         children[parent].add(node)
         self.parent[node] = parent
-        self._loose.discard(node)
+        self.loose.discard(node)
         change, below = cost - self.cost[node], [node]
         while below:
             at = below.pop()
@@ -149,7 +144,7 @@ class Nodes:
         if up >= 0 and self._children is not None:
             self._children[up].discard(node)
         self.parent[node] = -1
-        self._loose.add(node)
+        self.loose.add(node)
 
     def descends(self, node: int, ancestor: int) -> bool:
         """Return whether a node is another one, or descends from it."""

@@ -124,7 +124,8 @@ class Recorder(GraphEvents):
             elif up < 0:
                 total = 0.0
             else:
-                total = self._known_cost(nodes, up) + self._far(nodes.place(up), values)
+                above = self._known_cost(nodes, up) if nodes.loose else nodes.cost[up]
+                total = above + self._far(nodes.place(up), values)
             self._put(Kind.EDGE, total, values, tree, number, up)
             nodes.join(values, up, total)
             return number
@@ -401,7 +402,7 @@ class Recorder(GraphEvents):
     def _costs(self, nodes: Nodes, rows: Floats, up: Ints) -> Floats:
         """Return what new nodes cost, each after its parent, shape (n,)."""
         old = len(nodes)
-        for parent in np.unique(up[(up >= 0) & (up < old)]).tolist() if nodes.has_loose else ():
+        for parent in np.unique(up[(up >= 0) & (up < old)]).tolist() if nodes.loose else ():
             self._known_cost(nodes, parent)
         far = self._robot.distance(np.concatenate([nodes.q, rows])[np.maximum(up, 0)], rows)
         far = np.where(up >= 0, far, 0.0)
