@@ -217,8 +217,10 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
     ),
     Kind.CUT: (
         _TREE,
-        Field("node", "int32", "one end of an edge that is removed: a link, or that to a parent"),
-        Field("other", "int32", "the other end"),
+        Field(
+            "node", "int32", "one of two nodes whose edges, link and that to a parent, are removed"
+        ),
+        Field("other", "int32", "the other one"),
     ),
     Kind.REMOVE: (
         _TREE,

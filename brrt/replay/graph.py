@@ -225,3 +225,40 @@ def links_after(events: Events, tree: int) -> Table:
     if len(gone):
         kept = kept[~(np.isin(kept["node"], gone) | np.isin(kept["other"], gone))]
     return kept
+
+
+class LinkHistory:
+    """Finds out which links of a tree are there at any moments.
+
+    Args:
+        events: The log.
+        tree: Number of the tree.
+        nodes: How many nodes the tree ever has.
+    """
+
+    def __init__(self, events: Events, tree: int, nodes: int) -> None:
+        links, cuts = (of_tree(events[kind], tree) for kind in (Kind.LINK, Kind.CUT))
+        keys = np.concatenate([pair_keys(part["node"], part["other"]) for part in (links, cuts)])
+        seq = np.concatenate([links["seq"], cuts["seq"]])
+        self._pairs, pair = np.unique(keys, return_inverse=True)
+        self._scale = int(seq.max(initial=0)) + 1
+        at = pair * self._scale + seq
+        order = np.argsort(at)
+        self._at, self._there = at[order], (order < len(links))
+        self._removed = removal_times(events, tree, nodes)
+
+    def at(self, node: Ints, other: Ints, seq: Ints) -> Flags:
+        """Return which pairs of nodes a link joins right before events, shape (n,)."""
+        found = np.zeros(len(node), np.bool_)
+        if not len(self._pairs):
+            return found
+        keys = pair_keys(node, other)
+        pair = np.minimum(np.searchsorted(self._pairs, keys), len(self._pairs) - 1)
+        last = np.searchsorted(self._at, pair * self._scale + np.minimum(seq, self._scale)) - 1
+        known = (self._pairs[pair] == keys) & (last >= 0)
+        known &= self._at[last] // self._scale == pair
+        found[known] = self._there[last[known]]
+        for end in (node, other):
+            inside = (end >= 0) & (end < len(self._removed))
+            found[inside] &= self._removed[end[inside]] >= seq[inside]
+        return found

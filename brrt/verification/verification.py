@@ -22,6 +22,12 @@ _MADE_BY = {
 }  # fmt: skip
 """Parts of a contract, and events of planners that could promise them."""
 
+_GROWS_BY_EDGES = ("growth", "near")
+"""Parts of a contract whose rules judge trees that edges and rewires alone change."""
+
+_PRUNED = {Kind.VERTEX: "vertices", Kind.CUT: "cuts", Kind.REMOVE: "removals"}
+"""Kinds of events that change trees besides."""
+
 _PARTS = {Kind.SAMPLE: "samples", Kind.EDGE: "edges", Kind.EXPAND: "expanded cells"}
 """Kinds of events without which a planner's work cannot be judged."""
 
@@ -97,7 +103,10 @@ def verify(
                 rule.window(events, contract_now)
         context.end()
         for rule in active:
-            rule.finish()
+            if _other_changes(rule):
+                rule.result = RuleResult(rule.name, rule.promise)
+            else:
+                rule.finish()
     results = [rule.result for rule in made]
     missing, count = _not_judged(made), context.kept.count
     return Verification(results, missing, count, context.has_contract, context.is_cut)
@@ -143,10 +152,17 @@ def _not_judged(rules: list[Rule]) -> dict[str, list[str]]:
     """Return the names of the rules that could not judge, for each reason."""
     found: dict[str, list[str]] = {}
     for rule in rules:
-        reason = None if rule.result.examined else _reason(rule)
+        reason = rule.left_out or (None if rule.result.examined else _reason(rule))
         if reason is not None:
             found.setdefault(reason, []).append(rule.name)
     return found
+
+
+def _other_changes(rule: Rule) -> list[str]:
+    """Return what changes the trees besides edges and rewires, if the rule knows only these."""
+    if rule.needs not in _GROWS_BY_EDGES:
+        return []
+    return [name for kind, name in _PRUNED.items() if kind in rule.context.kept.kinds]
 
 
 def _reason(rule: Rule) -> str | None:
@@ -157,6 +173,9 @@ def _reason(rule: Rule) -> str | None:
         return f"the recording states no contract and planner {planner} is not registered"
     if rule.of_end and context.is_cut:
         return "the run's end is missing"
+    changes = _other_changes(rule)
+    if changes and _applies(rule):
+        return f"{' and '.join(changes)} change the trees, which the rules do not know"
     part = rule.needs
     if part in _MADE_BY and not context.contract.planner.registered and not _applies(rule):
         # A registered planner promises nothing of the kind; another one may have left it out.

@@ -1,13 +1,23 @@
 """All rules, one file for each subject. To add one, see `brrt.verification.rule`."""
 
 from brrt.verification.rule import Rule
-from brrt.verification.rules import log, long_run, moves, paths, phases, rejects, sampling, sequence
+from brrt.verification.rules import (
+    graph,
+    log,
+    long_run,
+    moves,
+    paths,
+    phases,
+    rejects,
+    sampling,
+    sequence,
+)
 from brrt.verification.rules.growth import extension, rewiring, trees
 from brrt.verification.rules.lattice import cells, lookahead, lrta_star, search
 
 _MODULES = (
-    log, phases, sequence, sampling, long_run, trees, extension, rewiring, rejects, paths, moves,
-    cells, lookahead, lrta_star, search,
+    log, phases, sequence, sampling, long_run, trees, extension, rewiring, rejects, graph,
+    paths, moves, cells, lookahead, lrta_star, search,
 )  # fmt: skip
 
 RULES: tuple[type[Rule], ...] = tuple(rule for module in _MODULES for rule in module.RULES)

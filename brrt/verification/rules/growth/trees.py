@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind, Table
 from brrt.replay.forest import reason
+from brrt.replay.graph import is_vertex
 from brrt.replay.text import vector
 from brrt.replay.tree_fold import VALID
 from brrt.verification.rule import Rule, TreeRule
@@ -38,8 +39,9 @@ class Roots(TreeRule):
     promise = "A tree has one root, its first node, at cost 0: the start, or in tree 1 the goal."
 
     def judge_tree(self, tree: TreeHistory) -> None:
-        is_root = tree.edges["parent"] < 0
-        first = np.arange(len(tree)) == 0
+        vertex = is_vertex(tree.edges)
+        is_root = (tree.edges["parent"] < 0) & ~vertex
+        first = (np.cumsum(~vertex) == 1) & ~vertex
         edges, rightly = tree.edges[is_root | first], (is_root & first)[is_root | first]
         wrong = ~rightly | (edges["cost"] != 0)
         wanted = {0: self.context.start, 1: self.context.goal}.get(tree.number)
@@ -99,7 +101,8 @@ class EdgeCosts(CostRule):
     promise = "A node's cost is its parent's at that moment plus the distance between them."
 
     def judge_tree(self, tree: TreeHistory) -> None:
-        connected, cost = tree.of_edges(tree.connected), tree.of_edges(tree.new_cost)
+        cost = tree.of_edges(tree.new_cost)
+        connected = tree.of_edges(tree.connected) & (cost < np.inf)  # below a root
         for chunk in tree.chunks():
             self.judge_costs(tree.edges[chunk][connected[chunk]], cost[chunk][connected[chunk]])
 
@@ -134,8 +137,9 @@ class RewireCosts(CostRule):
     kind = None
 
     def judge_tree(self, tree: TreeHistory) -> None:
-        valid = tree.of_rewires(tree.connected)
-        self.judge_costs(tree.rewires[valid], tree.of_rewires(tree.new_cost)[valid])
+        cost = tree.of_rewires(tree.new_cost)
+        valid = tree.of_rewires(tree.connected) & (cost < np.inf)
+        self.judge_costs(tree.rewires[valid], cost[valid])
 
 
 class RewiresGain(TreeRule):
@@ -193,7 +197,7 @@ class Links(Rule):
     def finish(self) -> None:
         context, links = self.context, self.context.events[Kind.CONNECT]
         (a, cost_a), (b, cost_b) = self._ends(0, links, "node"), self._ends(1, links, "other")
-        exist = np.isfinite(cost_a) & np.isfinite(cost_b)
+        exist = np.asarray(np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1))
         self.judge(
             links, ~exist,
             lambda i: f"nodes {links['node'][i]} and {links['other'][i]} do not both exist",
@@ -208,7 +212,7 @@ class Links(Rule):
                 lambda i: f"a link of {length[i]:.12g}; the limit is {limit[i]:.12g}",
             )  # fmt: skip
         self.judge(
-            table, ~context.equal(np.asarray(table["cost"]), cost),
+            table, ~context.equal(np.asarray(table["cost"]), cost) & (cost < np.inf),
             lambda i: f"costs {cost[i]:.12g}, not {table['cost'][i]:.12g}",
         )  # fmt: skip
         self.judge_free(table, a, b, "link")
@@ -219,8 +223,8 @@ class Links(Rule):
         for tree in self.context.trees:
             if tree.number == number and len(links):
                 node = links[name].astype(np.int64)
-                cost = tree.costs(links["seq"], node)
-                exist = np.isfinite(cost)
+                exist = tree.exist(links["seq"], node)
+                cost[exist] = tree.costs(links["seq"][exist], node[exist])
                 q[exist] = tree.q[node[exist]]
         return q, cost
 
