@@ -54,6 +54,16 @@ class Kind(Named):
     EXPAND = 8
     HEURISTIC = 9
     MOVE = 10
+    VERTEX = 11
+    LINK = 12
+    CUT = 13
+    REMOVE = 14
+    CHECK = 15
+
+
+GRAPH_KINDS = frozenset({Kind.VERTEX, Kind.LINK, Kind.CUT, Kind.REMOVE, Kind.CHECK})
+"""The kinds of graphs and of pruning. A file that holds one of them has a format of its own: a
+version of brrt that does not know them must not fold the rest."""
 
 
 @unique
@@ -167,7 +177,7 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
     ),
     Kind.REWIRE: (
         _TREE,
-        Field("node", "int32", "node that got a better parent; its descendants' costs follow"),
+        Field("node", "int32", "node that got another parent; its descendants' costs follow"),
         Field("parent", "int32", "the new parent"),
         Field("cost", "float64", "its new cost-to-come"),
     ),
@@ -193,6 +203,35 @@ FIELDS: Mapping[Kind, tuple[Field, ...]] = {
         Field("cell", "int32", "cell of the lattice that it ends in; -1 if there is none"),
         Field("cost", "float64", "length of this trial's moves so far, this one included"),
         Field("q", "q", "configuration that the robot moves to, in a straight line"),
+    ),
+    Kind.VERTEX: (
+        _TREE,
+        Field("node", "int32", "node that joined without an edge; numbered with those of edges"),
+        _Q,
+    ),
+    Kind.LINK: (
+        _TREE,
+        Field("node", "int32", "one end of an edge of a graph, which leads both ways"),
+        Field("other", "int32", "the other end, a node of the same tree"),
+        Field("cost", "float64", "cost of the edge; that of a later link of the two replaces it"),
+    ),
+    Kind.CUT: (
+        _TREE,
+        Field(
+            "node", "int32", "one of two nodes whose edges, link and that to a parent, are removed"
+        ),
+        Field("other", "int32", "the other one"),
+    ),
+    Kind.REMOVE: (
+        _TREE,
+        Field("node", "int32", "node that is removed with all its edges; its number stays unused"),
+    ),
+    Kind.CHECK: (
+        _TREE,
+        Field("node", "int32", "node at which the motion begins; -1 if it is at none"),
+        Field("other", "int32", "node at which it ends; -1 if it is at none"),
+        Field("part", "float64", "how much of the motion is free: from 0 to 1, 1 for all of it"),
+        Field("q", "q", "configuration at which it ends"),
     ),
 }
 
@@ -227,6 +266,11 @@ COUNTS: Mapping[Kind, Count] = {
     Kind.HEURISTIC: Count("learned", "estimate raised", "estimates raised"),
     Kind.SHORTCUT: Count("shortcuts", "shortcut", "shortcuts", "accepted"),
     Kind.MOVE: Count(None, "move", "moves"),
+    Kind.VERTEX: Count("vertices", "vertex", "vertices", "tree"),
+    Kind.LINK: Count("graph_edges", "graph edge", "graph edges", "tree"),
+    Kind.CUT: Count("cuts", "edge cut", "edges cut"),
+    Kind.REMOVE: Count("removals", "node removed", "nodes removed"),
+    Kind.CHECK: Count("checks", "motion checked", "motions checked", "part"),
 }
 """The kinds that are counted, in the order of reports."""
 

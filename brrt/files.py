@@ -250,6 +250,18 @@ class OutputFile:
             rest = rest[self._file.write(rest) :]
         self._dirty = True
 
+    def rewrite(self, at: int, data: bytes) -> bool:
+        """Replace bytes that were written; return False for pipes, which keep what they took."""
+        if not self._file.seekable():
+            return False
+        end = self._file.tell()
+        try:
+            self._file.seek(at)
+            self.write(data)
+        finally:
+            self._file.seek(end)
+        return True
+
     def truncate(self, size: int) -> None:
         """Remove what was written after the first `size` bytes, such as half a record."""
         with suppress(OSError):

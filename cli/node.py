@@ -1,5 +1,6 @@
 """`brrt replay --node`: the history of a node of a tree, or of a cell of a lattice."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from .console import print_json, print_pairs
 if TYPE_CHECKING:
     from brrt.recording import Limits, Recording
     from brrt.replay.cell_history import CellHistory
-    from brrt.replay.node_history import NodeHistory, When
+    from brrt.replay.node_history import CostChange, NodeHistory, When
 
 _SHOWN = 5
 """Events of a kind that are listed: the first ones, and the last."""
@@ -66,7 +67,8 @@ def _of_node(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:
 
     yield "node", f"{h.node:,} of {tree_name(h.tree)} at {vector(h.q, digits)}"
     parent = "the root" if h.born_parent < 0 else f"child of {h.born_parent:,}"
-    yield "added", f"{_when(h.born)}; {parent}, cost {h.born_cost:.6g}"
+    joined = f"{parent}, cost {h.born_cost:.6g}" if h.born_cost < math.inf else "a vertex"
+    yield "added", f"{_when(h.born)}; {joined}"
     if h.sample is not None:
         other = "" if h.sample.tree == h.tree else f" for tree {h.sample.tree}"
         drawn = f"{h.sample.source}{other}, {vector(h.sample.q, digits)}"
@@ -74,21 +76,25 @@ def _of_node(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:
     yield from _listed(
         "rewired",
         [
-            f"{_when(change.when)}; parent {change.old_parent:,} -> {change.parent:,}, "
-            f"cost {change.before:.6g} -> {change.after:.6g}"
+            f"{_when(change.when)}; "
+            f"parent {_number(change.old_parent)} -> {_number(change.parent)}, {_costs(change)}"
             for change in h.rewires
         ],
     )
     yield from _listed(
         "ancestors",
         [
-            f"{_when(change.when)}; ancestor {change.node:,} rewired, "
-            f"cost {change.before:.6g} -> {change.after:.6g}"
+            f"{_when(change.when)}; ancestor {change.node:,} "
+            f"{'rewired' if change.parent >= 0 else 'lost its parent'}, {_costs(change)}"
             for change in h.follows
         ],
     )
     if h.rewires or h.follows:
-        yield "now", f"child of {h.parent:,}, cost {h.cost:.6g}"
+        parent = f"child of {h.parent:,}" if h.parent >= 0 else "without a parent"
+        yield "now", f"{parent}, {'no cost' if h.cost == math.inf else f'cost {h.cost:.6g}'}"
+    if h.removed is not None:
+        yield "removed", _when(h.removed)
+    yield from _graph(h, digits)
     yield (
         "subtree",
         f"{counted(len(h.children), 'child', 'children')}{_some(h.children)}, "
@@ -98,6 +104,38 @@ def _of_node(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:
     on = [f"waypoint {i} of the {stage} path" for stage, i in h.paths.items()]
     yield "path", ", ".join(on) or "not on a path"
     yield from _rejects(h, digits)
+
+
+def _graph(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:
+    """Yield the links of a node, and the checked motions."""
+    if h.links:
+        there = [link.other for link in h.links if link.gone is None]
+        yield "links", f"{len(there):,} of {len(h.links):,} are there{_some(there)}"
+        lines = [
+            f"{_when(link.when)}; to {link.other:,}, cost {link.cost:.6g}"
+            + ("" if link.gone is None else f"; gone at event {link.gone.event:,}")
+            for link in h.links
+        ]
+        yield from _listed("", lines)
+    if h.checks:
+        free = sum(each.part == 1 for each in h.checks)
+        yield "checks", f"{counted(len(h.checks), 'motion')}, {free:,} free"
+        lines = [
+            f"{_when(each.when)}; from {_number(each.node)} to {_number(each.other)} at "
+            f"{vector(each.q, digits)}: {'free' if each.part == 1 else f'{each.part:.3g} of it'}"
+            for each in h.checks
+        ]
+        yield from _listed("", lines)
+
+
+def _number(node: int) -> str:
+    return f"{node:,}" if node >= 0 else "none"
+
+
+def _costs(change: "CostChange") -> str:
+    costs = (change.before, change.after)
+    before, after = ("none" if cost == math.inf else f"{cost:.6g}" for cost in costs)
+    return f"cost {before} -> {after}"
 
 
 def _rejects(h: "NodeHistory", digits: tuple[int, ...]) -> Rows:

@@ -1,5 +1,6 @@
 """`brrt replay`: the metrics and the trees of a run, from its recording alone."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +13,7 @@ from .options import At, AtEvent, AtIteration, Force, Partial, Run, instant
 if TYPE_CHECKING:
     from brrt.comparison.difference import Difference
     from brrt.recording import Limits, Recording
+    from brrt.replay.tree_stats import TreeFigures
 
 _EVENTS_BEFORE = 3
 """Events that are printed before a difference; `brrt diff` prints more."""
@@ -172,22 +174,28 @@ def _print_metrics(recording: "Recording", limits: "Limits", *, events: bool) ->
     trees = TreeStats(recording.robot().distance)
     metrics, recent = Metrics(recording.manifest), RecentEvents()
     feed(recording.batches(), [metrics, trees, *([recent] if events else [])], limits)
-    rows = [
-        {
-            "tree": str(tree.tree),
-            "nodes": f"{tree.nodes:,}",
-            "leaves": f"{tree.leaves:,}",
-            "depth": f"{tree.depth:,}",
-            "greatest cost-to-come": f"{tree.greatest_cost:.6g}",
-        }
-        for tree in trees.figures()  # raises if the events do not make trees
-    ]
+    rows = list(_rows_of(trees.figures()))  # raises if the events do not make trees
     print_summary(metrics.as_dict(), origins_of(recording.manifest))
     if rows:
         print_line()
         print_rows(rows)
     if events:
         print_lines(event_lines(recent.before(recent.next)))
+
+
+def _rows_of(trees: "list[TreeFigures]") -> Iterator[dict[str, str]]:
+    """Yield the row of each tree, with its links if any tree has some."""
+    for tree in trees:
+        links = {"links": f"{tree.links:,}"} if any(each.links for each in trees) else {}
+        cost = f"{tree.greatest_cost:.6g}" if tree.greatest_cost > -math.inf else "none"
+        yield {
+            "tree": str(tree.tree),
+            "nodes": f"{tree.nodes:,}",
+            **links,
+            "leaves": f"{tree.leaves:,}",
+            "depth": f"{tree.depth:,}",
+            "greatest cost-to-come": cost,
+        }
 
 
 def _verdict(

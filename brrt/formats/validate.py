@@ -41,6 +41,8 @@ def _check(kind: Kind, table: Table, count: int) -> None:
             for at, rows in enumerate(table[field.name]):
                 if not len(rows) or _beyond(rows, -GREATEST, GREATEST).any():
                     raise _error(kind, field.name, table[at])
+        elif field.name == "part":
+            _check_range(kind, field.name, table, 0, 1)
         elif field.type in ("q", "float64"):
             # An estimate is infinite if a cell has no free neighbour.
             most = np.inf if field.name == "h" else GREATEST

@@ -175,6 +175,11 @@ emit_connect: Callable[[Buffer, int, int, int, float], None] = _emitter(Kind.CON
 emit_expand: Callable[[Buffer, int, int, int, float, Floats, int], None] = _emitter(Kind.EXPAND)
 emit_heuristic: Callable[[Buffer, int, int, float, Floats, int], None] = _emitter(Kind.HEURISTIC)
 emit_move: Callable[[Buffer, int, int, int, int, float, Floats, int], None] = _emitter(Kind.MOVE)
+emit_vertex: Callable[[Buffer, int, int, int, Floats, int], None] = _emitter(Kind.VERTEX)
+emit_link: Callable[[Buffer, int, int, int, int, float], None] = _emitter(Kind.LINK)
+emit_cut: Callable[[Buffer, int, int, int, int], None] = _emitter(Kind.CUT)
+emit_remove: Callable[[Buffer, int, int, int], None] = _emitter(Kind.REMOVE)
+emit_check: Callable[[Buffer, int, int, int, int, float, Floats, int], None] = _emitter(Kind.CHECK)
 
 _PLAN = int(Phase.PLAN)
 

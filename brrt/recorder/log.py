@@ -55,6 +55,30 @@ class Log:
         if _open:
             _open[-1].path(*given, **named)
 
+    def vertex(self, *given: Any, **named: Any) -> int | None:
+        """See `Recorder.vertex`."""
+        return _open[-1].vertex(*given, **named) if _open else None
+
+    def link(self, *given: Any, **named: Any) -> None:
+        """See `Recorder.link`."""
+        if _open:
+            _open[-1].link(*given, **named)
+
+    def cut(self, *given: Any, **named: Any) -> None:
+        """See `Recorder.cut`."""
+        if _open:
+            _open[-1].cut(*given, **named)
+
+    def remove(self, *given: Any, **named: Any) -> None:
+        """See `Recorder.remove`."""
+        if _open:
+            _open[-1].remove(*given, **named)
+
+    def check(self, *given: Any, **named: Any) -> None:
+        """See `Recorder.check`."""
+        if _open:
+            _open[-1].check(*given, **named)
+
 
 log = Log()
 

@@ -16,6 +16,7 @@ from brrt.event_columns import COUNT, FIRST_SEQ, POINTS, EventColumns
 from brrt.events import Kind, Phase, Reason, Source, Stage, Status, Table
 from brrt.recorder import log
 from brrt.recorder.buffers import Buffer, apply_changes, check_events, columns_of, rising
+from brrt.recorder.graph_events import GraphEvents
 from brrt.recorder.nodes import Nodes, from_root
 from brrt.recorder.rows import ROOM, Rows
 from brrt.recorder.values import (
@@ -42,7 +43,7 @@ _MOST = 2**31 - 1
 """Nodes and cells have numbers of 32 bits."""
 
 
-class Recorder:
+class Recorder(GraphEvents):
     """Takes the events of a planner, from any thread, and hands them to a sink.
 
     Use it by `brrt.record`. Methods raise `BrrtError` for values that no event can have, and for
@@ -123,8 +124,11 @@ class Recorder:
                 raise BrrtError(f"node of tree {tree} must be {number}, its next, not {node!r:.60}")
             if cost is not None:
                 total = cost_of(cost)
+            elif up < 0:
+                total = 0.0
             else:
-                total = 0.0 if up < 0 else nodes.cost[up] + self._far(nodes.place(up), values)
+                above = self._known_cost(nodes, up) if nodes.loose else nodes.cost[up]
+                total = above + self._far(nodes.place(up), values)
             self._put(Kind.EDGE, total, values, tree, number, up)
             nodes.join(values, up, total)
             return number
@@ -142,6 +146,8 @@ class Recorder:
         with self._lock:
             most = max(len(self._nodes(tree)), self._cells, 1)
             at = whole("node", node, 0, most, f"a node of tree {tree} or an expanded cell")
+            if at in self._nodes(tree).removed:
+                raise BrrtError(f"node must be a node of tree {tree}; {at} was removed")
             self._put(Kind.REJECT, 0.0, values, tree, at, why)
 
     def rewire(self, node: int, parent: int, *, cost: float | None = None, tree: int = 0) -> None:
@@ -161,7 +167,8 @@ class Recorder:
             if cost is not None:
                 total = cost_of(cost)
             else:
-                total = nodes.cost[up] + self._far(nodes.place(up), nodes.place(at))
+                far = self._far(nodes.place(up), nodes.place(at))
+                total = self._known_cost(nodes, up) + far
             self._put(Kind.REWIRE, total, None, tree, at, up)
             nodes.move(at, up, total)
 
@@ -178,7 +185,8 @@ class Recorder:
             if cost is not None:
                 total = cost_of(cost)
             else:
-                total = a.cost[i] + self._far(a.place(i), b.place(j)) + b.cost[j]
+                far = self._far(a.place(i), b.place(j))
+                total = self._known_cost(a, i) + far + self._known_cost(b, j)
             self._put(Kind.CONNECT, total, None, i, j)
 
     def path(
@@ -251,6 +259,7 @@ class Recorder:
             numbers = len(nodes) + np.arange(len(rows))
             what = f"for each row a node of tree {tree} before it, or -1"
             up = wholes("parent", parent, len(rows), -1, numbers, what)
+            self._check_present("parent", up, tree)
             total = self._costs(nodes, rows, up) if cost is None else costs_of(cost, len(rows))
             fields = {"tree": tree, "node": numbers, "parent": up, "cost": total, "q": rows}
             self._put_many(Kind.EDGE, len(rows), fields, self._iteration)
@@ -266,6 +275,7 @@ class Recorder:
         with self._lock:
             most = max(len(self._nodes(tree)), self._cells, 1)
             at = wholes("node", node, len(rows), 0, most, f"nodes of tree {tree} or expanded cells")
+            self._check_present("node", at, tree)
             fields = {"tree": tree, "node": at, "reason": why, "q": rows}
             self._put_many(Kind.REJECT, len(rows), fields, self._iteration)
 
@@ -408,10 +418,28 @@ class Recorder:
         return self._trees[whole("tree", tree, 0, 2, "0 or 1")]
 
     def _node(self, name: str, node: Any, tree: int, low: int = 0) -> int:
-        count = len(self._nodes(tree).parent)
-        if type(node) is int and low <= node < count:  # the usual case, without a message
-            return node
-        return whole(name, node, low, count, f"a node of tree {tree}")
+        nodes = self._nodes(tree)
+        count, removed = len(nodes.parent), nodes.removed
+        if not removed and type(node) is int and low <= node < count:
+            return node  # the usual case, without a message
+        at = whole(name, node, low, count, f"a node of tree {tree}")
+        if at in removed:
+            raise BrrtError(f"{name} must be a node of tree {tree}; {at} was removed")
+        return at
+
+    def _node_rows(self, name: str, values: ArrayLike, count: int, tree: int, low: int = 0) -> Ints:
+        """Return numbers of nodes, each from `low` on, shape (count,)."""
+        most = len(self._nodes(tree))
+        numbers = wholes(name, values, count, low, most, f"nodes of tree {tree}")
+        self._check_present(name, numbers, tree)
+        return numbers
+
+    def _check_present(self, name: str, numbers: Ints, tree: int) -> None:
+        """Raise unless no node of an array was removed."""
+        removed = self._nodes(tree).removed
+        gone = removed.intersection(numbers.tolist()) if removed else ()
+        if gone:
+            raise BrrtError(f"{name} must be nodes of tree {tree}; {min(gone)} was removed")
 
     def _far(self, a: Sequence[float], b: Sequence[float]) -> float:
         """Return the distance in the robot's metric."""
@@ -422,6 +450,8 @@ class Recorder:
     def _costs(self, nodes: Nodes, rows: Floats, up: Ints) -> Floats:
         """Return what new nodes cost, each after its parent, shape (n,)."""
         old = len(nodes)
+        for parent in np.unique(up[(up >= 0) & (up < old)]).tolist() if nodes.loose else ():
+            self._known_cost(nodes, parent)
         far = self._robot.distance(np.concatenate([nodes.q, rows])[np.maximum(up, 0)], rows)
         far = np.where(up >= 0, far, 0.0)
         costs = nodes.cost[:]

@@ -79,6 +79,32 @@ def costs_of(cost: ArrayLike, count: int) -> Floats:
     return costs
 
 
+def fraction(name: str, value: Any) -> float:
+    """Return a number from 0 to 1.
+
+    Raises:
+        BrrtError: It is not.
+    """
+    if isinstance(value, (*_REAL, np.bool_)) and 0 <= value <= 1:
+        return float(value)
+    raise BrrtError(f"{name} must be a number from 0 to 1, not {value!r:.60}")
+
+
+def fractions(name: str, values: ArrayLike, count: int) -> Floats:
+    """Return numbers from 0 to 1, shape (count,).
+
+    Raises:
+        BrrtError: They are not, one for all or one for each.
+    """
+    try:
+        numbers = np.broadcast_to(np.asarray(values, np.float64), (count,))
+    except (TypeError, ValueError):
+        raise BrrtError(f"{name} must be {count} numbers, not {values!r:.60}") from None
+    if not ((numbers >= 0) & (numbers <= 1)).all():
+        raise BrrtError(f"{name} must be numbers from 0 to 1")
+    return numbers
+
+
 def whole(name: str, value: Any, low: int, high: int, what: str) -> int:
     """Return a whole number from `low` to below `high`.
 

@@ -1,15 +1,24 @@
-"""The trees at any instant: a fold over the edges and rewires of a log."""
+"""The trees and graphs at any instant: a fold over the edges, rewires and links of a log."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brrt.errors import LogError
 from brrt.events import Events, Kind, Table
+from brrt.replay.graph import (
+    LINK_DTYPE,
+    NEVER,
+    as_forest,
+    links_after,
+    removal_times,
+    uses_of_removed,
+)
 from brrt.replay.tree_fold import (
     CYCLE,
+    DETACHED,
     NO_NODE,
     NO_PARENT,
     VALID,
@@ -30,27 +39,44 @@ _BLOCK = 1 << 13
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
-    """One tree; row n of each array belongs to node n.
+    """One tree or graph; row n of each array belongs to node n.
 
     Attributes:
         q: Configurations, shape (n, dof).
-        parent: Parents, -1 for a root, shape (n,).
-        cost: Costs-to-come, shape (n,).
+        parent: Parents, -1 for a node without one, shape (n,).
+        cost: Costs-to-come, infinite for nodes that no root is above, shape (n,).
         born: `seq` of the event that made the node, shape (n,).
+        links: Edges beside those to parents: `seq`, `node`, `other` and `cost`, shape (m,).
+        removed: Numbers of nodes that were removed, in order; their rows remain.
     """
 
     q: NDArray[np.float64]
     parent: NDArray[np.int32]
     cost: NDArray[np.float64]
     born: NDArray[np.int64]
+    links: Table = field(default_factory=lambda: np.empty(0, LINK_DTYPE))
+    removed: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     def __len__(self) -> int:
         return len(self.parent)
 
     @property
     def leaves(self) -> int:
-        """Nodes without children."""
-        return leaves_of(self.parent)
+        """Nodes without children, as far as they are not removed."""
+        return leaves_of(self.parent) - len(self.removed)
+
+    def linked(self, node: int) -> Table:
+        """Return the links of a node; see `links`."""
+        own: Table = self.links[(self.links["node"] == node) | (self.links["other"] == node)]
+        return own
+
+    def neighbours(self, node: int) -> NDArray[np.int64]:
+        """Return the nodes that an edge joins with a node: parent, children, links; in order."""
+        links = self.linked(node)
+        parent = self.parent[node : node + 1]
+        parts = parent[parent >= 0], np.flatnonzero(self.parent == node)
+        ends = np.where(links["node"] == node, links["other"], links["node"])
+        return np.unique(np.concatenate([*parts, ends]).astype(np.int64))
 
     @property
     def depth(self) -> int:
@@ -153,7 +179,7 @@ def _depth_in_order(parent: Ints) -> int:
 
 
 def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tree]:
-    """Rebuild the trees as they are after the given events.
+    """Rebuild the trees, or graphs, as they are after the given events.
 
     Cut the log with `Events.until` for an earlier instant. Where a node was rewired, the costs of
     its descendants follow; a log does not state those.
@@ -166,19 +192,24 @@ def forest(events: Events, distance: Distance | None = None) -> Mapping[int, Tre
             Trees that only grow keep the costs that the log states.
 
     Raises:
-        LogError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire names
-            a node that does not exist, or closes a cycle.
+        LogError: A tree's nodes are not numbered 0, 1, 2 ... in order, or a rewire or a link names
+            a node that does not exist, or a rewire closes a cycle.
     """
-    edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
+    made = as_forest(events)
+    edges, rewires = made[Kind.EDGE], made[Kind.REWIRE]
     trees = {}
-    for number in trees_in(edges, rewires):
+    for number in trees_in(edges, rewires, events[Kind.LINK]):
         rows, rewired = of_tree(edges, number), of_tree(rewires, number)
         check_numbers(rows, number, 0)
+        check_removed(events, number)
         parent, cost = rows["parent"], rows["cost"]
-        if len(rewired):
+        if len(rewired) or made is not events:
             changes = TreeChanges.of(rows, rewired)
             parent, cost = _after(changes, rows["q"], distance)
-        trees[number] = Tree(rows["q"], parent, cost, rows["seq"])
+        check_links(events, number, rows["seq"])
+        removed = np.flatnonzero(removal_times(events, number, len(rows)) < NEVER)
+        links = links_after(events, number)
+        trees[number] = Tree(rows["q"], parent, cost, rows["seq"], links, removed)
     return trees
 
 
@@ -188,8 +219,10 @@ def _after(changes: TreeChanges, q: Floats, distance: Distance | None) -> tuple[
         check_verdicts(changes, changes.existence())
         parent = np.full(len(q), -1, np.int32)
         parent[changes.node] = changes.parent  # of several changes of a node the last one counts
+        stated = np.where(parent == DETACHED, np.inf, changes.stated[changes.joins])
+        parent = np.maximum(parent, -1)
         try:
-            return parent, final_costs(parent, changes.stated[changes.joins], q, distance)
+            return parent, final_costs(parent, stated, q, distance)
         except LogError:  # the fold names the event
             pass
     found = fold_costs(changes)
@@ -225,6 +258,35 @@ def check_numbers(rows: Table, tree: int, first: int) -> None:
         raise LogError(
             f"event {row['seq']}: node {row['node']} joins tree {tree} as its node {first + at}"
         )
+
+
+def check_removed(events: Events, tree: int) -> None:
+    """Raise `LogError` if an event names a node of a tree after its removal."""
+    for row, node in uses_of_removed(events, tree):
+        raise LogError(f"event {row['seq']}: node {node} of tree {tree} was removed before")
+
+
+def check_links(events: Events, tree: int, born: Ints) -> None:
+    """Raise `LogError` unless links join nodes that exist.
+
+    Args:
+        events: The log.
+        tree: Number of the tree.
+        born: Number of the event that made each of its nodes, shape (n,).
+    """
+    links = of_tree(events[Kind.LINK], tree)
+    for name in ("node", "other"):
+        missing = np.flatnonzero(~exists(links[name], links["seq"], born))
+        if len(missing):
+            row = links[missing[0]]
+            raise LogError(f"event {row['seq']}: a link to node {row[name]}, which does not exist")
+
+
+def exists(node: Ints, seq: Ints, born: Ints) -> NDArray[np.bool_]:
+    """Return which nodes exist at events, removed or not, shape (m,); `born` as `check_links`."""
+    known = (node >= 0) & (node < len(born))
+    known[known] = born[node[known]] < seq[known]
+    return np.asarray(known)
 
 
 def check_verdicts(changes: TreeChanges, verdict: Verdicts) -> None:

@@ -79,6 +79,12 @@ class Metrics:
         return self._counted.total(self.draws)
 
     @property
+    def nodes(self) -> int:
+        """Nodes of all trees and graphs that are there."""
+        counts = self.counts
+        return counts[Kind.EDGE] + counts[Kind.VERTEX] - counts[Kind.REMOVE]
+
+    @property
     def solved(self) -> bool:
         """Whether a path was found."""
         return self._raw is not None
@@ -109,7 +115,8 @@ class Metrics:
     def as_dict(self) -> dict[str, Any]:
         """Return the metrics under the names that `--json` prints; None for one without a value.
 
-        `nodes` and `edges` count the events of kind edge, roots included. `path` is the last that
+        `edges` counts the events of kind edge, roots included; `nodes` the nodes that they and
+        vertices made, less those that were removed. `path` is the last that
         the planner found. `moves` counts the last trial's moves if the robot moved, otherwise the
         motions of the final path (waypoints - 1).
         """
@@ -125,7 +132,7 @@ class Metrics:
             "iterations": self.draws,
             "counted_iterations": self.iterations,
             "events": sum(self.counts.values()),
-            "nodes": self.counts[Kind.EDGE],
+            "nodes": self.nodes,
             **{count.key: self.counts[kind] for kind, count in COUNTS.items() if count.key},
             "path_cost": _finite(raw and raw[0]),
             "path": None if raw is None else raw[1].tolist(),

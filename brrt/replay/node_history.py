@@ -1,5 +1,6 @@
-"""The history of one node of a tree: a fold over the events that concern it."""
+"""The history of one node of a tree or graph: a fold over the events that concern it."""
 
+import math
 from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
@@ -11,7 +12,8 @@ from brrt.errors import BrrtError
 from brrt.events import Events, Kind, Reason, Source, Stage, Table
 from brrt.replay.cost_history import CostHistory
 from brrt.replay.forest import Tree, forest
-from brrt.replay.tree_fold import Floats, TreeChanges
+from brrt.replay.graph import STRUCTURE, as_forest
+from brrt.replay.tree_fold import Floats, TreeChanges, trees_in
 from brrt.robots import Robot
 from brrt.worlds.world import World
 
@@ -59,14 +61,14 @@ class Draw:
 
 @dataclass(frozen=True, slots=True)
 class CostChange:
-    """A rewire that changed a node's cost.
+    """A rewire that changed a node's cost, or a cut or removal that took a parent away.
 
     Attributes:
-        when: The rewire's event.
-        node: The rewired node: the node itself or an ancestor.
-        old_parent: The rewired node's parent before.
-        parent: Its parent afterwards.
-        before: Cost-to-come, before, of the node whose history this is.
+        when: The event.
+        node: The node that got another parent: the node itself or an ancestor.
+        old_parent: Its parent before; -1 for none.
+        parent: Its parent afterwards; -1 for none.
+        before: Cost-to-come, before, of the node whose history this is; infinite for none.
         after: Its cost-to-come afterwards.
     """
 
@@ -96,6 +98,42 @@ class Rejection:
 
 
 @dataclass(frozen=True, slots=True)
+class Link:
+    """An edge of a graph at the node.
+
+    Attributes:
+        when: The last event that stated it.
+        other: The node at its other end.
+        cost: Its cost.
+        gone: The event that cut it, or removed a node of it; None if it is there.
+    """
+
+    when: When
+    other: int
+    cost: float
+    gone: When | None
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedMotion:
+    """A motion from or to the node that was checked for collisions.
+
+    Attributes:
+        when: Its event.
+        node: The node at which it begins; -1 for none.
+        other: The node at which it ends; -1 for none.
+        part: How much of it is free.
+        q: The configuration at which it ends.
+    """
+
+    when: When
+    node: int
+    other: int
+    part: float
+    q: list[float]
+
+
+@dataclass(frozen=True, slots=True)
 class NodeHistory:
     """A node up to an instant.
 
@@ -104,8 +142,8 @@ class NodeHistory:
         tree: Number of its tree.
         q: Its configuration.
         born: The event that added it.
-        born_parent: Its first parent; -1 for a root.
-        born_cost: Its first cost-to-come.
+        born_parent: Its first parent; -1 for a root or a vertex.
+        born_cost: Its first cost-to-come; infinite for a vertex.
         sample: The sample before it was added; None for roots.
         rewires: Each time it was rewired.
         follows: Each time its cost changed because an ancestor was rewired.
@@ -116,6 +154,9 @@ class NodeHistory:
         descendants: Number of nodes below it.
         paths: For each current path through it, by stage, the number of its waypoint.
         rejects: The rejected extensions from it.
+        removed: The event that removed it; None if it is there.
+        links: Its links, those that are gone included.
+        checks: Checked motions from and to it.
     """
 
     node: int
@@ -134,10 +175,14 @@ class NodeHistory:
     descendants: int
     paths: dict[str, int]
     rejects: list[Rejection]
+    removed: When | None
+    links: list[Link]
+    checks: list[CheckedMotion]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain numbers, texts, lists and dicts."""
-        return asdict(self)
+        """Return plain numbers, texts, lists and dicts; None for a cost that is not there."""
+        found: dict[str, Any] = _finite(asdict(self))
+        return found
 
     def reasons(self) -> dict[str, int]:
         """Count the rejected extensions by reason, most frequent first."""
@@ -155,6 +200,7 @@ class NodeTrace:
         self._node, self._tree, self._dof = node, tree, dof
         self._structure: list[Events] = []
         self._rejects: list[Table] = []
+        self._checks: list[CheckedMotion] = []
         self._drawn: Table | None = None
         self._sample: Draw | None = None
         self._paths: dict[str, Floats] = {}
@@ -162,18 +208,23 @@ class NodeTrace:
 
     def write(self, events: Events) -> None:
         """Take a batch."""
-        self._trees.update(np.unique(events[Kind.EDGE]["tree"]).tolist())
+        self._trees.update(trees_in(events[Kind.EDGE], events[Kind.VERTEX]))
         mine = {
             kind: table[table["tree"] == self._tree]
-            for kind in (Kind.EDGE, Kind.REWIRE, Kind.REJECT)
+            for kind in (*STRUCTURE, Kind.REJECT, Kind.CHECK)
             if len(table := events[kind])
         }
+        checks = mine.pop(Kind.CHECK, events[Kind.CHECK])
+        at = (checks["node"] == self._node) | (checks["other"] == self._node)
+        self._checks += [_checked(row) for row in checks[at]]
         rejects = mine.pop(Kind.REJECT, events[Kind.REJECT])
         self._rejects.append(rejects[rejects["node"] == self._node])
         self._structure.append(Events(self._dof, mine))
         samples = events[Kind.SAMPLE]
-        edges = mine.get(Kind.EDGE, events[Kind.EDGE][:0])
+        edges, vertices = (mine.get(k, events[k][:0]) for k in (Kind.EDGE, Kind.VERTEX))
         added = edges[edges["node"] == self._node]
+        if not len(added):
+            added = vertices[vertices["node"] == self._node]
         if len(added):
             before = samples[samples["seq"] < added["seq"][0]]
             last = before[-1:] if len(before) else self._drawn
@@ -209,8 +260,11 @@ class NodeTrace:
                 f"node {node:,} does not exist at this instant: {tree_name(self._tree)} has the "
                 f"nodes 0 to {len(tree) - 1:,}"
             )
-        edge, q = events[Kind.EDGE][node], tree.q[node]
-        costs = self._cost_changes(events, tree, robot)
+        made = as_forest(events)
+        edge, q = made[Kind.EDGE][node], tree.q[node]
+        costs = self._cost_changes(made, tree, robot)
+        removals = events[Kind.REMOVE]
+        removed = [When.of(row) for row in removals[removals["node"] == node]]
         return NodeHistory(
             node=node,
             tree=self._tree,
@@ -228,6 +282,9 @@ class NodeTrace:
             descendants=len(tree.below(node)),
             paths=self._waypoints(q),
             rejects=self._rejections(q, robot, world),
+            removed=removed[0] if removed else None,
+            links=_links_of(events, node),
+            checks=self._checks,
         )
 
     def _cost_changes(self, events: Events, tree: Tree, robot: Robot) -> list[CostChange]:
@@ -244,10 +301,11 @@ class NodeTrace:
             i, before = int(until[0]), float(cost[0])
             cost, until = history.at(changes.seq[i : i + 1], node)
             row = rewires[np.searchsorted(rewires["seq"], changes.seq[i])]
-            old = int(changes.parent[history.latest(row["node"][None], np.array([i]))[0]])
-            if cost[0] != before or row["node"] == self._node:
-                moved, parent, after = int(row["node"]), int(row["parent"]), float(cost[0])
-                found.append(CostChange(When.of(row), moved, old, parent, before, after))
+            moved, parent, after = int(changes.node[i]), int(changes.parent[i]), float(cost[0])
+            old = int(changes.parent[history.latest(np.array([moved]), np.array([i]))[0]])
+            if after != before or moved == self._node:
+                ends = max(old, -1), max(parent, -1)
+                found.append(CostChange(When.of(row), moved, *ends, before, after))
         return found
 
     def _waypoints(self, q: Floats) -> dict[str, int]:
@@ -269,6 +327,42 @@ class NodeTrace:
                 if hit >= 0:
                     found[i] = replace(found[i], hit=obstacles.name(hit))
         return found
+
+
+def _checked(row: Any) -> CheckedMotion:
+    """Return the motion in a row of a table of checks."""
+    ends = int(row["node"]), int(row["other"])
+    return CheckedMotion(When.of(row), *ends, float(row["part"]), row["q"].tolist())
+
+
+def _links_of(events: Events, node: int) -> list[Link]:
+    """Return the links of a node, by their first event."""
+    kinds = Kind.LINK, Kind.CUT, Kind.REMOVE
+    rows = [(int(row["seq"]), kind, row) for kind in kinds for row in events[kind]]
+    found: dict[int, Link] = {}
+    for _, kind, row in sorted(rows, key=lambda each: each[0]):
+        at, when = int(row["node"]), When.of(row)
+        if kind is Kind.REMOVE:
+            gone = list(found) if at == node else [at] if at in found else []
+        elif node not in (at, other := int(row["other"])):
+            continue
+        else:
+            end = other if at == node else at
+            gone = [end] if kind is Kind.CUT and end in found else []
+            if kind is Kind.LINK:
+                found[end] = Link(when, end, float(row["cost"]), None)
+        for end in gone:
+            found[end] = replace(found[end], gone=found[end].gone or when)
+    return list(found.values())
+
+
+def _finite(value: Any) -> Any:
+    """Return plain data with None for numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def tree_name(tree: int) -> str:

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from brrt.errors import BrrtError
-from brrt.events import Events, Kind
+from brrt.events import Events
 from brrt.recording import Limits, Recording, instant
 from brrt.replay.cell_history import CellHistory, CellTrace
 from brrt.replay.fold import Fold, feed, until
 from brrt.replay.forest import Tree, forest
+from brrt.replay.graph import structure_of
 from brrt.replay.metrics import Metrics, Path
 from brrt.replay.node_history import NodeHistory, NodeTrace
 
@@ -48,9 +49,9 @@ class Snapshot:
         Raises:
             RecordingError: The events do not make trees.
         """
-        run, kinds = self.recording, (Kind.EDGE, Kind.REWIRE)
-        edges = (Events(each.dof, {kind: each[kind] for kind in kinds}) for each in self._batches())
-        return forest(Events.concat(run.manifest.dof, edges), run.robot().distance)
+        run = self.recording
+        parts = (structure_of(each) for each in self._batches())
+        return forest(Events.concat(run.manifest.dof, parts), run.robot().distance)
 
     @cached_property
     def metrics(self) -> Metrics:

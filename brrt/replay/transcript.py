@@ -147,8 +147,8 @@ def _named(kind: Kind, choice: str | None, found: Mapping[int, int]) -> str:
     """Write how many events there are with each value of a field."""
     if choice is None or (choice == "tree" and len(found) == 1):
         return ""
-    if choice == "accepted":
-        return f"{found.get(1, 0):,} accepted"
+    if choice in ("accepted", "part"):
+        return f"{found.get(1, 0):,} {'free' if choice == 'part' else choice}"
     if choice == "tree":
         return ", ".join(f"{n:,} in tree {tree}" for tree, n in found.items())
     choices = next(field.choices for field in FIELDS[kind] if field.name == choice)

@@ -26,6 +26,10 @@ VALID, NO_PARENT, NO_NODE, CYCLE = range(4)
 """Verdict on a change: it can be made; the parent does not exist (yet); the rewired node does not
 exist (yet); the parent descends from the node."""
 
+DETACHED = int(np.iinfo(np.int32).min)
+"""The parent of a node that is rewired to none, since its edge was cut or its parent removed; see
+`brrt.replay.graph`."""
+
 _CHUNK = 1 << 16
 """Changes that are measured, or converted to Python numbers, at once."""
 
@@ -48,7 +52,8 @@ class TreeChanges(NamedTuple):
     Attributes:
         seq: Numbers of the events, shape (m,).
         node: Nodes that join or are rewired, shape (m,).
-        parent: Their parents from then on; below 0 for a root; shape (m,).
+        parent: Their parents from then on; below 0 for a root, `DETACHED` for a node that loses its
+            parent; shape (m,).
         stated: Their costs-to-come, as the events state them, shape (m,).
         joins: Whether the node joins the tree (an edge) or is rewired, shape (m,).
     """
@@ -87,7 +92,7 @@ class TreeChanges(NamedTuple):
         """Return the verdict on each change apart from cycles, shape (m,); `first` nodes exist."""
         exist = first + np.cumsum(self.joins)
         no_parent = (self.parent >= exist) | (self.joins & (self.parent == self.node))
-        no_parent |= ~self.joins & (self.parent < 0)
+        no_parent |= ~self.joins & (self.parent < 0) & (self.parent != DETACHED)
         no_node = ~self.joins & ((self.node < 0) | (self.node >= exist))
         return np.select([no_node, no_parent], [NO_NODE, NO_PARENT], VALID).astype(np.uint8)
 
@@ -148,6 +153,10 @@ def _fold(
     ordered = bool((np.diff(joined) > 0).all())
     rising = ordered
     for i, v, p, stated, joins, measured in _rows(changes, length, np.asarray(verdict)):
+        if p < 0:
+            before[i] = tree.cost_of(v)
+            tree.detach(v)
+            continue
         parent_cost[i] = above = tree.cost_of(p)
         if not (joins and ordered):
             now = tree.cost_of(v)
@@ -156,7 +165,9 @@ def _fold(
             if not (rising and above < now) and tree.descends(p, v):
                 verdict[i] = CYCLE
                 continue
-        more = stated - above if math.isnan(measured) else measured
+        more = measured
+        if math.isnan(measured):
+            more = stated - above if above < math.inf else 0.0
         rising = rising and more >= 0.0
         tree.hang(v, p, more)
     return tree
@@ -168,7 +179,8 @@ def _rows(
     """Yield number, node, parent, stated cost, whether it joins, and length of valid changes."""
     for first in range(0, len(length), _CHUNK):
         chunk = slice(first, first + _CHUNK)
-        rows = first + np.flatnonzero((verdict[chunk] == VALID) & (changes.parent[chunk] >= 0))
+        moves = (changes.parent[chunk] >= 0) | (changes.parent[chunk] == DETACHED)
+        rows = first + np.flatnonzero((verdict[chunk] == VALID) & moves)
         columns = changes.node, changes.parent, changes.stated, changes.joins, length
         yield from zip(rows.tolist(), *(c[rows].tolist() for c in columns), strict=True)
 
@@ -233,8 +245,16 @@ class _Tree:
             node = parent[node]
         return node == root
 
-    def hang(self, node: int, parent: int, length: float) -> None:
-        """Put a node below a parent whose cost is fresh."""
+    def detach(self, node: int) -> None:
+        """Make a node a root of infinite cost."""
+        self._leave(node)
+        self.parent[node] = self._next[node] = self._last[node] = -1
+        self._cost[node], self._fresh[node] = math.inf, 1
+        if self._child[node] >= 0:
+            self._spoil(self._child[node])
+
+    def _leave(self, node: int) -> None:
+        """Take a node out of its siblings."""
         child, after, before = self._child, self._next, self._last
         left, right, old = before[node], after[node], self.parent[node]
         if left >= 0:
@@ -243,6 +263,12 @@ class _Tree:
             child[old] = right
         if right >= 0:
             before[right] = left
+
+    def hang(self, node: int, parent: int, length: float) -> None:
+        """Put a node below a parent whose cost is fresh."""
+        child, after, before = self._child, self._next, self._last
+        if self.parent[node] >= 0:
+            self._leave(node)
         first = child[parent]
         child[parent], after[node], before[node] = node, first, -1
         if first >= 0:

@@ -84,6 +84,7 @@ class Manifest:
         branches: Where the settings changed, in order, for a run that continues a recorded one.
         contract: What the planner promises, by the settings of `scenario`; None if not stated.
         claims: How the log was made.
+        graph: Whether events of `events.GRAPH_KINDS` may follow; a sink sets it with the first.
     """
 
     scenario: Scenario
@@ -97,10 +98,11 @@ class Manifest:
     branches: tuple[Branch, ...] = ()
     contract: Contract | None = None
     claims: Claims = field(default_factory=Claims)
+    graph: bool = False
 
-    FORMAT, BRANCHED = "1", "2"
+    FORMAT, BRANCHED, GRAPH = "1", "2", "3"
     """Runs with branches have a format of their own: a reader that does not know them would apply
-    the last settings to the whole run."""
+    the last settings to the whole run. So have graphs: it would take the file as damaged."""
 
     def __post_init__(self) -> None:
         """Check that the robot is stated: no file that a recording names is ever opened.
@@ -151,6 +153,13 @@ class Manifest:
         """
         return self.scenario.make_robot() if self.robot is None else robot_from_json(self.robot)
 
+    @property
+    def format(self) -> str:
+        """The least format that holds the run."""
+        if self.graph:
+            return self.GRAPH
+        return self.BRANCHED if self.branches else self.FORMAT
+
     def to_strings(self) -> dict[str, str]:
         """One text a field, as MCAP metadata takes them; everything but plain texts as JSON."""
         texts = {} if self.robot is None else {"robot": self.robot}
@@ -164,7 +173,7 @@ class Manifest:
             earlier = [None if c is None else c.as_dict() for c in self.contracts[:-1]]
             texts["branch_contracts"] = json.dumps(earlier)
         return texts | {
-            "format": self.BRANCHED if self.branches else self.FORMAT,
+            "format": self.format,
             "scenario": json.dumps(self.scenario.as_dict()),
             "start": json.dumps(self.start),
             "goal": json.dumps(self.goal),
@@ -181,7 +190,7 @@ class Manifest:
         Raises:
             BrrtError: A field is missing or damaged, or the format is newer than this brrt.
         """
-        if texts.get("format") not in (cls.FORMAT, cls.BRANCHED):
+        if texts.get("format") not in (cls.FORMAT, cls.BRANCHED, cls.GRAPH):
             raise BrrtError(
                 f"recording format {texts.get('format')!r} is not {cls.FORMAT!r}; update brrt"
             )
@@ -198,6 +207,7 @@ class Manifest:
                 _branches(texts),
                 _contract(_json(texts.get("contract", "null"))),
                 _claims(_json(texts.get("claims", "null"))),
+                texts["format"] == cls.GRAPH,
             )
         except KeyError as error:
             raise BrrtError(f"the manifest is damaged: it has no {error}") from None

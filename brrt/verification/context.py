@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brrt.collision.motions import Obstacles, first_hits
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
+from brrt.replay.graph import as_forest
 from brrt.replay.tree_fold import trees_in
 from brrt.robots import Robot
 from brrt.scenario.claims import Claims
@@ -177,8 +178,9 @@ class Context:
     @cached_property
     def trees(self) -> list[TreeHistory]:
         """The trees."""
-        numbers = trees_in(self.events[Kind.EDGE], self.events[Kind.REWIRE])
-        return [TreeHistory.of(number, self.events, self.distance) for number in numbers]
+        made = as_forest(self.events)
+        numbers = trees_in(made[Kind.EDGE], made[Kind.REWIRE])
+        return [TreeHistory.of(number, made, self.distance) for number in numbers]
 
     @cached_property
     def paths(self) -> list[tuple[Any, Floats]]:

@@ -34,6 +34,7 @@ class Rule:
         of_end: Whether it judges the end of a run, which cut recordings lack.
         context: The recording.
         result: What the rule has found so far.
+        left_out: What it could not judge, as `Verification.not_judged` states it; None for nothing.
     """
 
     name: ClassVar[str]
@@ -46,6 +47,7 @@ class Rule:
     def __init__(self, context: Context) -> None:
         self.context = context
         self.result = RuleResult(self.name, self.promise)
+        self.left_out: str | None = None
 
     def window(self, events: Events, contract: Contract) -> None:
         """Judge the next events, all of which were made under one contract."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Table
 from brrt.replay.cost_history import CostHistory
+from brrt.replay.forest import exists
 from brrt.replay.tree_fold import VALID, CostFold, Distance, TreeChanges, fold_costs, of_tree
 
 Floats = NDArray[np.float64]
@@ -48,7 +49,13 @@ class TreeHistory:
 
     @classmethod
     def of(cls, number: int, events: Events, distance: Distance) -> Self:
-        """Fold the tree of a number."""
+        """Fold the tree of a number; vertices, cuts and removals are edges and rewires here.
+
+        Args:
+            number: The tree's number.
+            events: What `as_forest` returns.
+            distance: The robot's metric.
+        """
         tables = (of_tree(events[kind], number) for kind in (Kind.EDGE, Kind.REWIRE))
         edges, rewires = map(_in_order, tables)
         changes = TreeChanges.of(edges, rewires)
@@ -89,6 +96,17 @@ class TreeHistory:
         found = np.full(len(order), np.nan)
         found[order[1:]] = np.where(node[1:] == node[:-1], stated[:-1], np.nan)
         return found
+
+    def parents(self, seq: Ints, node: Ints) -> Ints:
+        """Return the parents of nodes right before events, -1 without one, shape (k,)."""
+        count = np.searchsorted(self.changes.seq, seq, side="left")
+        change = self._history.latest(node, count)
+        parent = np.where(change >= 0, self.changes.parent[change], -1)
+        return np.asarray(np.maximum(parent, -1))
+
+    def exist(self, seq: Ints, node: Ints) -> Flags:
+        """Return which nodes exist at events, removed or not, shape (k,)."""
+        return exists(node, seq, self.edges["seq"])
 
     def chunks(self) -> Iterator[slice]:
         """Yield slices of the edges, of which there may be millions."""

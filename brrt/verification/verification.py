@@ -24,6 +24,12 @@ _MADE_BY = {
 
 NO_TREE = "without edges the log proves nothing of a tree"
 
+_GROWS_BY_EDGES = ("growth", "near")
+"""Parts of a contract whose rules judge trees that edges and rewires alone change."""
+
+_PRUNED = {Kind.VERTEX: "vertices", Kind.CUT: "cuts", Kind.REMOVE: "removals"}
+"""Kinds of events that change trees besides."""
+
 _PARTS = {Kind.SAMPLE: "samples", Kind.EDGE: "edges", Kind.EXPAND: "expanded cells"}
 """Kinds of events without which a planner's work cannot be judged."""
 
@@ -39,7 +45,7 @@ class Verification:
         has_contract: Whether there is a contract; without one only what all planners promise is
             judged.
         is_cut: Whether the run's end is missing; then no rule judges it.
-        has_tree: Whether there are edges or expanded cells; a log without them proves nothing of
+        has_tree: Whether there are edges, links or expanded cells; a log without them proves nothing of
             a tree.
     """
 
@@ -109,10 +115,13 @@ def verify(
                 rule.window(events, contract_now)
         context.end()
         for rule in active:
-            rule.finish()
+            if _other_changes(rule):
+                rule.result = RuleResult(rule.name, rule.promise)
+            else:
+                rule.finish()
     results = [rule.result for rule in made]
     missing, kept = _not_judged(made), context.kept
-    has_tree = not kept.kinds.isdisjoint({Kind.EDGE, Kind.EXPAND})
+    has_tree = not kept.kinds.isdisjoint({Kind.EDGE, Kind.LINK, Kind.EXPAND})
     return Verification(
         results, missing, kept.count, context.has_contract, context.is_cut, has_tree
     )
@@ -164,10 +173,17 @@ def _not_judged(rules: list[Rule]) -> dict[str, list[str]]:
     """Return the names of the rules that could not judge, for each reason."""
     found: dict[str, list[str]] = {}
     for rule in rules:
-        reason = None if rule.result.examined else _reason(rule)
+        reason = rule.left_out or (None if rule.result.examined else _reason(rule))
         if reason is not None:
             found.setdefault(reason, []).append(rule.name)
     return found
+
+
+def _other_changes(rule: Rule) -> list[str]:
+    """Return what changes the trees besides edges and rewires, if the rule knows only these."""
+    if rule.needs not in _GROWS_BY_EDGES:
+        return []
+    return [name for kind, name in _PRUNED.items() if kind in rule.context.kept.kinds]
 
 
 def _reason(rule: Rule) -> str | None:
@@ -178,6 +194,9 @@ def _reason(rule: Rule) -> str | None:
         return f"the recording states no contract and planner {planner} is not registered"
     if rule.of_end and context.is_cut:
         return "the run's end is missing"
+    changes = _other_changes(rule)
+    if changes and _applies(rule):
+        return f"{' and '.join(changes)} change the trees, which the rules do not know"
     part = rule.needs
     if part in _MADE_BY and not context.contract.planner.registered and not _applies(rule):
         # A registered planner promises nothing of the kind; another one may have left it out.

@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 from brrt.files import OutputFile
 from brrt.formats.mcap.records import FOOTER_BYTES, INDEX_ENTRY, MAGIC
 
+SLACK = 16
+"""Bytes by which rewritable texts may grow, such as a checksum by the digits of another one."""
+
 _SUMMARY = {
     records.Schema: Opcode.SCHEMA,
     records.Channel: Opcode.CHANNEL,
@@ -120,6 +123,23 @@ class Container:
         start, length = self._record(records.Metadata(name, dict(texts)))
         self._summary[records.MetadataIndex].append(records.MetadataIndex(start, length, name))
 
+    def rewritable_metadata(self, name: str, texts: Mapping[str, str]) -> None:
+        """Write named texts that `rewrite_metadata` can replace."""
+        start, length = self._write_at_end(_padded(name, texts))
+        self._summary[records.MetadataIndex].append(records.MetadataIndex(start, length, name))
+
+    def rewrite_metadata(self, name: str, old: Mapping[str, str], new: Mapping[str, str]) -> None:
+        """Replace rewritable texts by others of at most `SLACK` bytes more; pipes keep the old."""
+        index = next(i for i in self._summary[records.MetadataIndex] if i.name == name)
+        before, after = _padded(name, old), _padded(name, new, index.length)
+        self.flush()
+        if self._file.rewrite(index.offset, after):
+            # A CRC changes by that of the bytes that differ, followed by zeros up to the end.
+            changed = bytes(a ^ b for a, b in zip(before, after, strict=True))
+            rest = self._position - index.offset - len(after)
+            self._crc ^= _crc_before_zeros(changed, rest)
+            self._crc ^= _crc_before_zeros(bytes(len(changed)), rest)
+
     def attach(self, name: str, data: bytes, at_ns: int) -> None:
         """Write an attachment in JSON."""
         kind = "application/json"
@@ -180,7 +200,10 @@ class Container:
 
     def _record(self, record: records.McapRecord) -> tuple[int, int]:
         """Write a record; return where it begins and how long it is."""
-        data, start = _to_bytes(record), self._position
+        return self._write_at_end(_to_bytes(record))
+
+    def _write_at_end(self, data: bytes) -> tuple[int, int]:
+        start = self._position
         self._write(data)
         return start, len(data)
 
@@ -197,6 +220,33 @@ class Container:
             metadata_count=len(self._summary[records.MetadataIndex]),
             schema_count=len(self._summary[records.Schema]),
         )
+
+
+def _padded(name: str, texts: Mapping[str, str], length: int | None = None) -> bytes:
+    """Return a Metadata record with bytes at its end that readers ignore, as MCAP allows.
+
+    Args:
+        name: Its name.
+        texts: Its texts.
+        length: Bytes of the whole record; by default `SLACK` more than it needs.
+
+    Raises:
+        ValueError: It does not fit.
+    """
+    data = _to_bytes(records.Metadata(name, dict(texts)))
+    length = len(data) + SLACK if length is None else length
+    if len(data) > length:
+        raise ValueError(f"{name} needs {len(data)} bytes, not {length}")
+    head = struct.pack("<BQ", Opcode.METADATA, length - 9)
+    return (head + data[len(head) :]).ljust(length, b"\0")
+
+
+def _crc_before_zeros(data: bytes, zeros: int) -> int:
+    """Return the CRC-32 of bytes and of as many zeros after them."""
+    crc, block = zlib.crc32(data), bytes(1 << 20)
+    for left in range(zeros, 0, -len(block)):
+        crc = zlib.crc32(block[:left], crc)
+    return crc
 
 
 def _to_bytes(*written: records.McapRecord) -> bytes:

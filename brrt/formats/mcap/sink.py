@@ -5,14 +5,15 @@ in chunks, one topic a kind, then the metadata `brrt.result` and the summary.
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from mcap import records
 
 from brrt.errors import WriteError
-from brrt.events import Events, Kind
+from brrt.events import GRAPH_KINDS, Events, Kind
 from brrt.formats.batching import Batching
 from brrt.formats.mcap.container import Container
 from brrt.formats.mcap.messages import ENCODINGS, TOPICS, Layout, channel_of, definition, encode
@@ -49,9 +50,9 @@ class McapSink:
     """
 
     def __init__(self, path: Path | str, manifest: Manifest, world: World) -> None:
-        self._path, self._epoch = Path(path), manifest.epoch_ns
-        definitions = {kind: definition(kind, manifest.dof) for kind in Kind}
-        self._layouts = {kind: Layout.parse(text) for kind, text in definitions.items()}
+        self._path, self._epoch, self._manifest = Path(path), manifest.epoch_ns, manifest
+        self._definitions = {kind: definition(kind, manifest.dof) for kind in Kind}
+        self._layouts = {kind: Layout.parse(text) for kind, text in self._definitions.items()}
         self._batching = Batching(manifest.dof, _CHUNK_EVENTS, _CHUNK_SECONDS)
         library = f"brrt {manifest.made_by.get('brrt', '')}".strip()
         try:
@@ -59,8 +60,8 @@ class McapSink:
         except OSError as error:
             raise WriteError(path, error.strerror or str(error)) from None
         try:
-            self._file.declare(*_declarations(definitions))
-            self._file.metadata(RUN, with_checksum(manifest.to_strings()))
+            self._declare(kind for kind in Kind if manifest.graph or kind not in GRAPH_KINDS)
+            self._file.rewritable_metadata(RUN, with_checksum(manifest.to_strings()))
             self._file.attach(WORLD, world.to_json().encode(), manifest.epoch_ns)
             self._file.flush()
         except OSError as error:
@@ -112,7 +113,20 @@ class McapSink:
     def _write_chunk(self, events: Events | None) -> None:
         if events is not None:
             with self._converting_errors():
+                if not self._manifest.graph and not GRAPH_KINDS.isdisjoint(events.counts):
+                    self._become_graph()
                 self._file.chunk(*encode(events, self._layouts, self._epoch))
+
+    def _become_graph(self) -> None:
+        """Give the file the format of graphs, before its first event of them."""
+        old, self._manifest = self._manifest, replace(self._manifest, graph=True)
+        texts = (with_checksum(each.to_strings()) for each in (old, self._manifest))
+        self._file.rewrite_metadata(RUN, *texts)
+        self._declare(kind for kind in Kind if kind in GRAPH_KINDS)
+
+    def _declare(self, kinds: Iterable[Kind]) -> None:
+        """Declare the schemas and channels of kinds of events."""
+        self._file.declare(*_declarations({kind: self._definitions[kind] for kind in kinds}))
 
 
 def _declarations(definitions: Mapping[Kind, str]) -> Iterator[records.Schema | records.Channel]:
@@ -121,4 +135,5 @@ def _declarations(definitions: Mapping[Kind, str]) -> Iterator[records.Schema | 
         name = f"brrt_msgs/msg/{kind.label.capitalize()}"
         yield records.Schema(channel_of(kind), text.encode(), of_schemas, name)
     for topic, kind in TOPICS.items():
-        yield records.Channel(channel_of(kind), topic, of_messages, {}, channel_of(kind))
+        if kind in definitions:
+            yield records.Channel(channel_of(kind), topic, of_messages, {}, channel_of(kind))

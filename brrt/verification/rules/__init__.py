@@ -2,6 +2,7 @@
 
 from brrt.verification.rule import Rule
 from brrt.verification.rules import (
+    graph,
     log,
     long_run,
     moves,
@@ -16,8 +17,8 @@ from brrt.verification.rules.growth import extension, rewiring, trees
 from brrt.verification.rules.lattice import cells, lookahead, lrta_star, search
 
 _MODULES = (
-    log, phases, sequence, sampling, long_run, trees, extension, rewiring, rejects, paths, moves,
-    own_motions, cells, lookahead, lrta_star, search,
+    log, phases, sequence, sampling, long_run, trees, extension, rewiring, rejects, graph,
+    paths, moves, own_motions, cells, lookahead, lrta_star, search,
 )  # fmt: skip
 
 RULES: tuple[type[Rule], ...] = tuple(rule for module in _MODULES for rule in module.RULES)

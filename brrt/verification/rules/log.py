@@ -136,7 +136,7 @@ class Bounds(Rule):
         self.high = np.where(wraps, np.nextafter(np.pi, 0), context.upper + slack)
 
     def window(self, events: Events, contract: Contract) -> None:
-        for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE):
+        for kind in (Kind.SAMPLE, Kind.EDGE, Kind.EXPAND, Kind.HEURISTIC, Kind.MOVE, Kind.VERTEX):
             self._judge(kind, events[kind])
         for event in events[Kind.PATH]:
             path = waypoints(event, self.context.dof)

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.collision.motions import all_clear
-from brrt.events import Kind, Phase, Stage, Status, Table
+from brrt.events import Events, Kind, Phase, Stage, Status, Table
+from brrt.replay.graph import LinkHistory
 from brrt.replay.text import vectors
+from brrt.replay.tree_fold import DETACHED
 from brrt.verification.context import Context
 from brrt.verification.rule import ANY_PART, Rule
 from brrt.verification.tree_history import TreeHistory
@@ -102,7 +104,7 @@ class PathsImprove(Rule):
 
 class PathsInTrees(Rule):
     name = "paths in trees"
-    promise = "The motions of a tree planner's path are edges of that moment, or links."
+    promise = "The motions of a path are edges of trees or graphs at that moment, or links."
     needs = ANY_PART
     kind = Kind.EDGE
     assumes = ("times",)
@@ -110,9 +112,9 @@ class PathsInTrees(Rule):
     def finish(self) -> None:
         paths = self.context.planned_paths
         wanted = {place for _, path in paths for place in _places(path)}
-        trees = [_Parents(tree, wanted) for tree in self.context.trees]
+        trees = [_Edges(tree, self.context.events, wanted) for tree in self.context.trees]
         links = _links(self.context)
-        for event, path in paths if len(self.context.events[Kind.EDGE]) else ():
+        for event, path in paths if trees else ():
             for tree in trees:
                 tree.advance(int(event["seq"]))
             loose = [
@@ -131,11 +133,13 @@ def _places(path: Any) -> list[Place]:
     return [tuple(q) for q in np.asarray(path).tolist()]
 
 
-class _Parents:
-    """The parents in a tree at some event, and which nodes are at some places."""
+class _Edges:
+    """The edges of a tree or graph at some event, and which nodes are at some places."""
 
-    def __init__(self, tree: TreeHistory, wanted: set[Place]) -> None:
-        self.tree, self.done = tree, 0
+    def __init__(self, tree: TreeHistory, events: Events, wanted: set[Place]) -> None:
+        self.tree, self.done, self.seq = tree, 0, 0
+        self.links = LinkHistory(events, tree.number, len(tree))
+        self.connected = tree.connected | (tree.changes.parent == DETACHED)
         self.parent = np.full(len(tree), -1, np.int64)
         self.nodes: dict[Place, list[int]] = {}
         # The first coordinate alone excludes most nodes of a large tree.
@@ -151,15 +155,19 @@ class _Parents:
         """Make the changes before an event."""
         changes = self.tree.changes
         end = int(np.searchsorted(changes.seq, seq))
-        rows = np.arange(self.done, end)[self.tree.connected[self.done : end]]
+        rows = np.arange(self.done, end)[self.connected[self.done : end]]
         self.parent[changes.node[rows]] = changes.parent[rows]  # the last of several counts
-        self.done = max(self.done, end)
+        self.done, self.seq = max(self.done, end), seq
 
     def joins(self, a: Place, b: Place) -> bool:
-        """Return whether one of two places is the other's parent."""
+        """Return whether one of two places is the other's parent, or a link joins them."""
         ours, theirs = self.nodes.get(a, []), self.nodes.get(b, [])
         up = {(node, int(self.parent[node])) for node in ours + theirs}
-        return any((x, y) in up or (y, x) in up for x in ours for y in theirs)
+        if any((x, y) in up or (y, x) in up for x in ours for y in theirs):
+            return True
+        ends = np.array([(x, y) for x in ours for y in theirs], np.int64).reshape(-1, 2)
+        seq = np.full(len(ends), self.seq)
+        return bool(self.links.at(ends[:, 0], ends[:, 1], seq).any())
 
 
 def _links(context: Context) -> dict[tuple[Place, Place], int]:

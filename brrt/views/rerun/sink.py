@@ -2,13 +2,14 @@
 
 import json
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
 
 from brrt.errors import RecordingError
-from brrt.events import Events, Kind
+from brrt.events import GRAPH_KINDS, Events, Kind
 from brrt.formats.batching import Batching
 from brrt.formats.rrd.columns import (
     END,
@@ -63,7 +64,7 @@ class RerunSink:
         path: Path | str | None = None,
         view: bool = False,
     ) -> None:
-        self._view, self._layout = view, blueprint(manifest, world)
+        self._view, self._layout, self._manifest = view, blueprint(manifest, world), manifest
         self._counts = dict.fromkeys(Kind, 0)
         self._batching = Batching(manifest.dof, _BATCH, _VIEW_S if view else _FILE_S)
         self._rows = max(256, _WINDOW // (8 * manifest.dof + 5))
@@ -74,7 +75,7 @@ class RerunSink:
         try:
             first = blueprint(manifest, world, live=True) if view else self._layout
             connect(self._rec, first, self._pipe, view=view)
-            self._write_texts(MANIFEST, {"json": json.dumps(manifest.to_strings())})
+            self._write_manifest()
             self._write_texts(WORLD, {"json": world.to_json()})
             self._drawing = RunDrawing(self._rec, manifest, world)
             self._flush()
@@ -123,6 +124,10 @@ class RerunSink:
     def _write(self, events: Events | None) -> None:
         if events is None:
             return
+        if not self._manifest.graph and not GRAPH_KINDS.isdisjoint(events.counts):
+            # Readers take the last manifest, and older ones refuse its format.
+            self._manifest = replace(self._manifest, graph=True)
+            self._write_manifest()
         for kind, table in events.tables.items():
             for first in range(0, len(table), self._rows):
                 rows = table[first : first + self._rows]
@@ -131,6 +136,9 @@ class RerunSink:
             self._counts[kind] += len(table)
         self._drawing.write(events)
         self._flush()
+
+    def _write_manifest(self) -> None:
+        self._write_texts(MANIFEST, {"json": json.dumps(self._manifest.to_strings())})
 
     def _write_texts(self, entity: str, texts: dict[str, str]) -> None:
         value = rr.DynamicArchetype(archetype(entity), components=texts)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from brrt.events import Kind, Table
 from brrt.replay.forest import reason
+from brrt.replay.graph import is_vertex
 from brrt.replay.text import vector
 from brrt.replay.tree_fold import VALID
 from brrt.verification.rule import Rule, TreeRule
@@ -44,8 +45,9 @@ class Roots(TreeRule):
     )
 
     def judge_tree(self, tree: TreeHistory) -> None:
-        is_root = tree.edges["parent"] < 0
-        first = np.arange(len(tree)) == 0
+        vertex = is_vertex(tree.edges)
+        is_root = (tree.edges["parent"] < 0) & ~vertex
+        first = (np.cumsum(~vertex) == 1) & ~vertex
         edges, rightly = tree.edges[is_root | first], (is_root & first)[is_root | first]
         context = self.context
         wrong = ~rightly | ((edges["cost"] != 0) & (context.claims.costs == "length"))
@@ -119,7 +121,8 @@ class EdgeCosts(CostRule):
     def judge_tree(self, tree: TreeHistory) -> None:
         if len(tree.rewires) and "times" in self.context.unknown:
             return  # what the parent cost at that moment is not known
-        connected, cost = tree.of_edges(tree.connected), tree.of_edges(tree.new_cost)
+        cost = tree.of_edges(tree.new_cost)
+        connected = tree.of_edges(tree.connected) & (cost < np.inf)  # below a root
         for chunk in tree.chunks():
             self.judge_costs(tree.edges[chunk][connected[chunk]], cost[chunk][connected[chunk]])
 
@@ -156,8 +159,9 @@ class RewireCosts(CostRule):
     assumes = ("costs", "times")
 
     def judge_tree(self, tree: TreeHistory) -> None:
-        valid = tree.of_rewires(tree.connected)
-        self.judge_costs(tree.rewires[valid], tree.of_rewires(tree.new_cost)[valid])
+        cost = tree.of_rewires(tree.new_cost)
+        valid = tree.of_rewires(tree.connected) & (cost < np.inf)
+        self.judge_costs(tree.rewires[valid], cost[valid])
 
 
 class RewiresGain(TreeRule):
@@ -236,7 +240,7 @@ class LinkRule(Rule):
         """Judge the links between existing nodes."""
         links = self.context.events[Kind.CONNECT]
         (a, cost_a), (b, cost_b) = self._ends(0, links, "node"), self._ends(1, links, "other")
-        exist = np.isfinite(cost_a) & np.isfinite(cost_b)
+        exist = np.asarray(np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1))
         self.judge_lost(links, ~exist)
         a, b = a[exist], b[exist]
         through, length = (cost_a + cost_b)[exist], self.context.distance(a, b)
@@ -255,8 +259,8 @@ class LinkRule(Rule):
         for tree in self.context.trees:
             if tree.number == number and len(links):
                 node = links[name].astype(np.int64)
-                cost = tree.costs(links["seq"], node)
-                exist = np.isfinite(cost)
+                exist = tree.exist(links["seq"], node)
+                cost[exist] = tree.costs(links["seq"][exist], node[exist])
                 q[exist] = tree.q[node[exist]]
         return q, cost
 
@@ -289,7 +293,7 @@ class LinkCosts(LinkRule):
     def judge_links(self, links: LinkEnds) -> None:
         stated, cost = np.asarray(links.table["cost"]), links.through + links.length
         self.judge(
-            links.table, ~self.context.right_cost(stated, cost),
+            links.table, ~self.context.right_cost(stated, cost) & (cost < np.inf),
             lambda i: f"costs {cost[i]:.12g}, not {stated[i]:.12g}",
         )  # fmt: skip
 
