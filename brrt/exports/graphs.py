@@ -79,7 +79,7 @@ def _links(run: Snapshot) -> Iterator[tuple[Node, Node]]:
     for link in run.events[Kind.CONNECT]:
         yield (0, int(link["node"])), (1, int(link["other"]))
     for number, tree in run.forest.items():
-        for link in getattr(tree, "links", ()):
+        for link in tree.links:
             yield (number, int(link["node"])), (number, int(link["other"]))
 
 

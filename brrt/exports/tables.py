@@ -83,7 +83,7 @@ def node_columns(snapshot: Snapshot, coordinates: tuple[str, ...]) -> Columns:
         return {}
     parts = []
     for number, tree in trees.items():
-        rows = np.setdiff1d(np.arange(len(tree)), getattr(tree, "removed", ()))
+        rows = np.setdiff1d(np.arange(len(tree)), tree.removed)
         parts.append({
             "tree": np.full(len(rows), number), "node": rows, "parent": tree.parent[rows],
             "cost": tree.cost[rows], "seq": tree.born[rows],

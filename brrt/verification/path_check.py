@@ -217,7 +217,7 @@ def check_path(
     place = world if isinstance(world, World) else make_world(str(world))
     body = (robot if isinstance(robot, Robot) else make_robot(str(robot))).resolved(place)
     names = body.coordinates(place)
-    if getattr(body, "opaque", False):
+    if body.opaque:
         raise BrrtError("the robot's shape is not known, so no motion can be judged; give --robot")
     if not 0 <= tolerance < np.inf:
         raise BrrtError(f"tolerance must be a number from 0 on, not {tolerance!r:.60}")

@@ -45,8 +45,8 @@ class Verification:
         has_contract: Whether there is a contract; without one only what all planners promise is
             judged.
         is_cut: Whether the run's end is missing; then no rule judges it.
-        has_tree: Whether there are edges, links or expanded cells; a log without them proves nothing of
-            a tree.
+        has_tree: Whether there are edges, links or expanded cells; a log without them proves
+            nothing of a tree.
     """
 
     results: list[RuleResult]

@@ -17,7 +17,7 @@ class ConfigurationsFree(Rule):
         if self.context.claims.motions == "straight":
             return  # rules about motions judge their ends
         if self.context.claims.edges == "checked":
-            for kind in (Kind.EDGE, Kind.EXPAND):
+            for kind in (Kind.EDGE, Kind.VERTEX, Kind.EXPAND):
                 self._judge(events[kind], kind.label)
         for event in events[Kind.PATH]:
             path = waypoints(event, self.context.dof)
