@@ -6,6 +6,7 @@ import numpy as np
 
 from brrt.events import Events, Kind, Phase, Reason, Source, Stage, Status, Table, table_dtype
 from brrt.explanation.cells import CellSummary
+from brrt.replay.graph import is_vertex, joined_nodes
 from brrt.replay.metrics import Metrics
 from brrt.robots import Robot
 from brrt.scenario.manifest import Manifest
@@ -123,8 +124,8 @@ class RunSummary:
             table = events[kind]
             if len(table):
                 np.maximum.at(self.bins.t, table["iteration"] // self.bins.length, table["t"])
-        if Kind.EDGE in events.counts:
-            self._add_nodes(events[Kind.EDGE])
+        if Kind.EDGE in events.counts or Kind.VERTEX in events.counts:
+            self._add_nodes(joined_nodes(events))
         if Kind.EXPAND in events.counts or Kind.MOVE in events.counts:
             self._add_expansions(events)
         self._add_rejects(events)
@@ -184,7 +185,8 @@ class RunSummary:
             mine = edges[edges["tree"] == tree]
             self._nodes.setdefault(tree, []).append(np.array(mine["q"]))
             self._iterations.setdefault(tree, []).append(np.array(mine["iteration"]))
-            if tree == 0:
+            mine = mine[~is_vertex(mine)]  # that one is near the goal says nothing of a way there
+            if tree == 0 and len(mine):
                 self._approach(mine, "node")
 
     def _add_rejects(self, events: Events) -> None:

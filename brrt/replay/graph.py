@@ -75,7 +75,7 @@ class GraphFold:
         cuts, removals = events[Kind.CUT], events[Kind.REMOVE]
         graph = is_graph(events)
         if graph:
-            edges = _in_order(edges, _joining(events))
+            edges = joined_nodes(events)
         detached = []
         for number in trees_in(edges, rewires, cuts, removals):
             joined, changed = of_tree(edges, number), of_tree(rewires, number)
@@ -145,6 +145,11 @@ class _Parents:
         self._children[self._parent.get(node, -1)].discard(node)
         self._parent[node] = parent
         self._children[parent].add(node)
+
+
+def joined_nodes(events: Events) -> Table:
+    """Return the edges of a batch, and its vertices as edges without a parent, in order."""
+    return _in_order(events[Kind.EDGE], _joining(events))
 
 
 def _joining(events: Events) -> Table:

@@ -23,6 +23,8 @@ GOAL: Colour = (60, 215, 100)
 OTHER: Colour = (180, 120, 255)
 """For what has no colour of its own."""
 LINK: Colour = (255, 236, 170)
+GRAPH: Colour = (86, 128, 132)
+"""Edges of a graph, beside those of trees."""
 GHOST: Colour = (150, 128, 60)
 """The body along a path."""
 TRACE: Colour = (205, 205, 215)
@@ -70,6 +72,7 @@ PAPER_PATH: Colour = (216, 164, 0)
 PAPER_SMOOTHED: Colour = (168, 110, 0)
 PAPER_REJECTED: Colour = (178, 120, 124)
 PAPER_HIT: Colour = (206, 38, 46)
+PAPER_GRAPH: Colour = (118, 150, 154)
 PAPER_ROBOT: Colour = (20, 22, 28)
 PAPER_TREES: Mapping[int, tuple[str, Colour, Colour]] = {
     0: ("start", (38, 104, 214), (0, 158, 190)),

@@ -270,7 +270,7 @@ def test_damaged_manifests() -> None:
         with pytest.raises(BrrtError, match="the manifest is damaged"):
             Manifest.from_strings({**texts, "branches": wrong})
     with pytest.raises(BrrtError, match="update brrt"):
-        Manifest.from_strings({**texts, "format": "3"})
+        Manifest.from_strings({**texts, "format": "4"})
 
 
 def test_on_the_command_line(brrt: Callable[..., Result]) -> None:

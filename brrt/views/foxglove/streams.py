@@ -10,10 +10,21 @@ from numpy.typing import NDArray
 from brrt.errors import LogError
 from brrt.events import Events, Kind, Stage, Table
 from brrt.replay.forest import forest
-from brrt.replay.tree_fold import TreeChanges
+from brrt.replay.graph import as_forest
+from brrt.replay.tree_fold import DETACHED, TreeChanges
 from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
-from brrt.views.colours import LINK, NEWEST, ROBOT, TRACE, Colour, heat, path_style, tree_style
+from brrt.views.colours import (
+    GRAPH,
+    LINK,
+    NEWEST,
+    ROBOT,
+    TRACE,
+    Colour,
+    heat,
+    path_style,
+    tree_style,
+)
 from brrt.views.foxglove.draw_world import BODIES, GROUND, PATHS, dot, line_list, outline
 from brrt.views.foxglove.interval_topics import BATCH, interval_messages
 from brrt.views.foxglove.messages import MARKER, Marker, MarkerType
@@ -49,13 +60,15 @@ class MarkerStreams:
     """
 
     def __init__(self, manifest: Manifest, world: World, events: Events) -> None:
-        self._manifest, self._world, self._events = manifest, world, events
+        self._manifest, self._world = manifest, world
+        self._events = as_forest(events)
         self._robot = manifest.make_robot()
         self._trees = forest(events, self._robot.resolved(world).distance)
 
     def streams(self) -> Iterator[Stream]:
         """Yield all streams."""
         for number in self._trees:
+            yield self._graph(number)
             yield self._tree(number)
             yield self._newest(number)
         yield self._links()
@@ -74,12 +87,32 @@ class MarkerStreams:
         t = np.concatenate([joins["t"], rewires["t"]])
         seq = np.concatenate([joins["seq"], rewires["seq"]])
         t = t[np.argsort(seq, kind="stable")]
-        edges = made.parent >= 0
+        edges = (made.parent >= 0) | (made.parent == DETACHED)
         node, parent = made.node[edges], made.parent[edges]
-        _check_nodes(made.seq[edges], parent, len(places))
-        ends = np.stack([places[parent], places[node]], axis=1)
+        _check_nodes(made.seq[edges], parent[parent >= 0], len(places))
+        ends = np.stack([places[np.maximum(parent, 0)], places[node]], axis=1)
         name, colour = tree_style(number)
-        return self._lines(f"/viz/tree/{name}", t[edges], node, ends, colour, 1.5)
+        return self._lines(f"/viz/tree/{name}", t[edges], node, ends, colour, 1.5, parent >= 0)
+
+    def _graph(self, number: int) -> Stream:
+        """Show the links of a graph; one that is cut, or loses a node, goes."""
+        links, cuts = (self._of_tree(kind, number) for kind in (Kind.LINK, Kind.CUT))
+        if not len(links):
+            return iter(())
+        places = self._places(self._trees[number].q)
+        pairs = np.stack([links["node"], links["other"]], axis=1)
+        states = [_states(links, pairs, True), _states(cuts, _pairs(cuts), False)]
+        for row in self._of_tree(Kind.REMOVE, number):
+            own = pairs[(pairs == row["node"]).any(axis=1) & (links["seq"] < row["seq"])]
+            states.append(_states(np.repeat(row[None], len(own)), own, False))
+        found = np.concatenate(states)
+        found = found[np.argsort(found["seq"], kind="stable")]
+        _check_nodes(found["seq"], found["pair"].max(axis=1), len(places))
+        low, high = np.sort(found["pair"], axis=1).T
+        keys = low.astype(np.int64) << 32 | high
+        name, ends = tree_style(number)[0], places[found["pair"]]
+        topic = f"/viz/graph/{name}"
+        return self._lines(topic, found["t"], keys, ends, GRAPH, 1.0, found["there"])
 
     def _newest(self, number: int) -> Stream:
         """Show the body at the newest node, once in `BATCH` nodes."""
@@ -178,7 +211,14 @@ class MarkerStreams:
         return mine
 
     def _lines(
-        self, topic: str, t: Ints, keys: Ints, ends: Floats, colour: Colour, width: float
+        self,
+        topic: str,
+        t: Ints,
+        keys: Ints,
+        ends: Floats,
+        colour: Colour,
+        width: float,
+        there: NDArray[np.bool_] | None = None,
     ) -> Stream:
         points = np.zeros((len(ends), 2, 3))
         points[..., : self._world.dim] = ends
@@ -186,7 +226,22 @@ class MarkerStreams:
         def draw(items: Ints) -> Marker:
             return line_list(self._world, points[items].reshape(-1, 3), colour, width)
 
-        return _newest_states(topic, t, keys, draw)
+        return _newest_states(topic, t, keys, draw, there)
+
+
+_STATE = np.dtype([("seq", "<i8"), ("t", "<i8"), ("pair", "<i4", (2,)), ("there", "?")])
+
+
+def _pairs(table: Table) -> Ints:
+    return np.stack([table["node"], table["other"]], axis=1)
+
+
+def _states(table: Table, pairs: Ints, there: bool) -> Table:
+    """Return the states that events give to the links of pairs of nodes, shape (n,)."""
+    states = np.empty(len(table), _STATE)
+    states["seq"], states["t"] = table["seq"], table["t"]
+    states["pair"], states["there"] = pairs, there
+    return states
 
 
 def _message(row: np.void, topic: str, marker: Marker) -> Message:
@@ -200,7 +255,13 @@ def _check_nodes(seq: Ints, nodes: NDArray[np.integer], count: int) -> None:
         raise LogError(f"event {seq[i]}: there is no node {nodes[i]}")
 
 
-def _newest_states(topic: str, t: Ints, keys: Ints, draw: Callable[[Ints], Marker]) -> Stream:
+def _newest_states(
+    topic: str,
+    t: Ints,
+    keys: Ints,
+    draw: Callable[[Ints], Marker],
+    there: NDArray[np.bool_] | None = None,
+) -> Stream:
     """Show at each instant the newest state of each key, on topics `topic`/L00 and so on.
 
     Args:
@@ -208,13 +269,14 @@ def _newest_states(topic: str, t: Ints, keys: Ints, draw: Callable[[Ints], Marke
         t: When each state begins, never falling, shape (n,).
         keys: What it is a state of, shape (n,).
         draw: Returns a marker of some of the states; also of none.
+        there: Which states are shown, shape (n,); all if it is None.
     """
     instants, born = np.unique(t, return_inverse=True)
     gone = np.full(len(t), len(instants))
     order = np.argsort(keys, kind="stable")
     follows = keys[order[1:]] == keys[order[:-1]]
     gone[order[:-1][follows]] = born[order[1:][follows]]
-    visible = np.flatnonzero(born < gone)
+    visible = np.flatnonzero((born < gone) & (True if there is None else there))
     for instant, level, items in interval_messages(born[visible], gone[visible], len(instants)):
         body = draw(visible[items]).message()
         yield Message(int(instants[instant]), f"{topic}/L{level:02d}", MARKER, body)

@@ -9,6 +9,7 @@ from brrt.errors import LogError
 from brrt.events import Instant, Kind, Phase, Stage, Status
 from brrt.recording import Recording
 from brrt.replay.forest import forest
+from brrt.replay.graph import as_forest, links_after, structure_of
 from brrt.replay.tree_fold import TreeChanges, of_tree
 from brrt.scenario.contracts import contract_of
 
@@ -52,8 +53,9 @@ class Playback:
         self.contract = contract_of(self._manifest, recording.world)
         self._places: dict[int, Floats] = {}
         self._changes: dict[int, TreeChanges] = {}
+        folded = as_forest(self._events)
+        edges, rewires = (folded[kind] for kind in (Kind.EDGE, Kind.REWIRE))
         for number, tree in forest(self._events, self.robot.distance).items():
-            edges, rewires = (self._events[kind] for kind in (Kind.EDGE, Kind.REWIRE))
             made = TreeChanges.of(of_tree(edges, number), of_tree(rewires, number))
             _check_parents(made, len(tree))
             self._places[number] = self.robot.places(tree.q)
@@ -95,8 +97,19 @@ class Playback:
         """Return the number of nodes of all trees, or of expanded cells, after an event."""
         if self.has_cells:
             return int(np.searchsorted(self._cells["seq"], seq, side="right"))
-        edges = self._events[Kind.EDGE]["seq"]
-        return int(np.searchsorted(edges, seq, side="right"))
+        events = self._events
+        joined, left = (Kind.EDGE, Kind.VERTEX), (Kind.REMOVE,)
+        counts = (
+            sum(int(np.searchsorted(events[kind]["seq"], seq, side="right")) for kind in kinds)
+            for kinds in (joined, left)
+        )
+        return next(counts) - next(counts)
+
+    def links(self, number: int, seq: int) -> Floats:
+        """Return the ends of the links of a graph after an event, shape (n, 2, dim)."""
+        links = links_after(structure_of(self._events).until(seq=seq), number)
+        ends = np.stack([links["node"], links["other"]], axis=1)
+        return np.asarray(self._places[number][ends])
 
     def edges(self, number: int, seq: int) -> TreeEdges:
         """Return the edges of a tree after an event."""

@@ -13,6 +13,7 @@ from brrt.views.matplotlib.draw_world import need_matplotlib
 START, GOAL = rgb(colours.PAPER_START), rgb(colours.PAPER_GOAL)
 PATH, SMOOTHED = rgb(colours.PAPER_PATH), rgb(colours.PAPER_SMOOTHED)
 REJECTED, ROBOT = rgb(colours.PAPER_REJECTED), rgb(colours.PAPER_ROBOT)
+GRAPH = rgb(colours.PAPER_GRAPH)
 QUIET = rgb(colours.OUTLINE)
 """Captions and notes."""
 CURVES = tuple(map(rgb, colours.PAPER_CURVES))

@@ -23,8 +23,8 @@ _GHOSTS = 10
 """Bodies along a path."""
 _PARTS = 16
 """Pieces of a motion between two configurations of a body, whose place may follow a curve."""
-_LAYERS = {"cells": 2.0, "rejects": 2.1, "tree": 2.2, "ghosts": 2.5, "trace": 2.7, "path": 3.0,
-           "end": 5.0, "robot": 6.0}  # fmt: skip
+_LAYERS = {"cells": 2.0, "rejects": 2.1, "links": 2.15, "tree": 2.2, "ghosts": 2.5,
+           "trace": 2.7, "path": 3.0, "end": 5.0, "robot": 6.0}  # fmt: skip
 
 
 class TreePanel:
@@ -61,6 +61,9 @@ class TreePanel:
         width = style.line_width(self.playback.nodes(self.playback.last))
         for number in self.playback.trees:
             name, colour, rewired = style.tree_style(number)
+            self._lines[number, "links"] = self._collection(
+                style.GRAPH, width, "links", 0.8, f"{name} graph"
+            )
             self._lines[number] = self._collection(colour, width, "tree", 1.0, f"{name} tree")
             self._lines[number, "rewired"] = self._collection(
                 rewired, width, "tree", 1.0, "rewired"
@@ -88,6 +91,7 @@ class TreePanel:
             self._draw_lines(self._lines["rejects"], playback.rejects(seq, self._rejects))
         for number in playback.trees:
             edges = playback.edges(number, seq)
+            self._draw_lines(self._lines[number, "links"], playback.links(number, seq))
             self._draw_lines(self._lines[number], edges.ends[~edges.rewired])
             self._draw_lines(self._lines[number, "rewired"], edges.ends[edges.rewired])
         if playback.has_cells:

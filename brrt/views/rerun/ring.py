@@ -9,6 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind
+from brrt.replay.graph import joined_nodes
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import RING
 from brrt.views.rerun.draw_world import log_label
@@ -55,9 +56,9 @@ def place_of(
         pairs = zip(row["waypoints"], theirs, strict=False)
         differ = (i for i, (ours, their) in enumerate(pairs) if (ours != their).any())
         return np.asarray(row["waypoints"][next(differ, -1)])
-    if kind in (Kind.REWIRE, Kind.CONNECT):
-        edges = until[Kind.EDGE]
-        tree = row["tree"] if kind is Kind.REWIRE else 0
+    if kind in (Kind.REWIRE, Kind.CONNECT, Kind.LINK, Kind.CUT, Kind.REMOVE):
+        edges = joined_nodes(until)
+        tree = 0 if kind is Kind.CONNECT else row["tree"]
         return np.asarray(edges["q"][(edges["tree"] == tree) & (edges["node"] == row["node"])][0])
     placed = [each for each in newest.values() if "q" in (each.dtype.names or ())]
     if not placed:

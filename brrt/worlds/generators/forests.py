@@ -162,7 +162,7 @@ class Forest3D(PoissonForest):
     dim: ClassVar[int] = 3
 
     min_height: float = param(0.5, "least height of the trees", low=0, high=1, unit="of size")
-    max_height: float = param(1.0, "greatest height of the trees", low=0, high=1, unit="of size")
+    max_height: float = param(1.0, "greatest height of the trees", above=0, high=1, unit="of size")
 
     def __post_init__(self) -> None:
         """Check the heights as well."""

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Table
+from brrt.replay.graph import GraphFold, is_vertex
 from brrt.views.colours import LINK, NEWEST, packed, tree_style
 from brrt.views.rerun.draw.canvas import Canvas, growing_rows, merged, times_of
 from brrt.views.rerun.draw.decimate import DRAWN_IN_FULL, DrawnNodes, one_in_stride
+from brrt.views.rerun.draw.graphs import GraphsDrawing
 from brrt.views.rerun.draw.pages import Pages
 from brrt.views.rerun.draw.paths import draw_bodies
 from brrt.views.rerun.draw.transient import TransientDrawing
@@ -24,11 +26,13 @@ class TreesDrawing:
         self._canvas, self._nodes, self._transient = canvas, nodes, transient
         self._trees: dict[int, _TreeDrawing] = {}
         self._links = 0
+        self._graph, self._graphs = GraphFold(), GraphsDrawing(canvas, nodes)
         canvas.style(LINK_ENTITY, canvas.lines, LINK, -2.5, 45.0)
 
     def write(self, events: Events) -> None:
         """Draw a batch."""
-        edges, rewires = events[Kind.EDGE], events[Kind.REWIRE]
+        made = self._graph.take(events)
+        edges, rewires = made[Kind.EDGE], made[Kind.REWIRE]
         for number in np.flatnonzero(np.bincount(edges["tree"])).tolist():
             if number not in self._trees:
                 self._nodes[number] = DrawnNodes(self._canvas.world)
@@ -36,14 +40,17 @@ class TreesDrawing:
         for number, tree in self._trees.items():
             rewired = _of_tree(rewires, number)
             tree.draw(_of_tree(edges, number), rewired)
+            rewired = rewired[rewired["parent"] >= 0]
             if len(rewired):
                 self._transient.draw_rewired(number, rewired)
+        self._graphs.write(events)
         self._draw_links(events[Kind.CONNECT])
 
     def close(self) -> None:
         """Draw the rest."""
         for tree in self._trees.values():
             tree.close()
+        self._graphs.close()
 
     def _draw_links(self, table: Table) -> None:
         if not len(table) or not {0, 1} <= self._nodes.keys():
@@ -101,7 +108,8 @@ class _TreeDrawing:
         places = canvas.places(edges["q"])
         if self._root is None:
             self._root = places[0]
-        which = self._nodes.add(edges["node"], places, edges["parent"] >= 0)
+        wanted = (edges["parent"] >= 0) | is_vertex(edges)
+        which = self._nodes.add(edges["node"], places, wanted)
         ends = growing_rows(before, len(edges))
         canvas.plot(f"/series/nodes/{self._name}", edges[ends - 1], before + ends)
         if self._nodes.decimation.began_within(len(edges)):
@@ -136,7 +144,9 @@ class _TreeDrawing:
     def _edges(self, rows: Table) -> NDArray[np.void]:
         """Return the edges of some events as items."""
         items = np.empty(len(rows), self._edge)
-        items["ends"][:, 0] = self._nodes.places(rows["parent"])
+        # The edge of a node without a parent is a dot.
+        begins = np.where(rows["parent"] >= 0, rows["parent"], rows["node"])
+        items["ends"][:, 0] = self._nodes.places(begins)
         items["ends"][:, 1] = self._nodes.places(rows["node"])
         return items
 
