@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from brrt.verification.result import RuleResult
     from brrt.verification.verification import Verification
 
-_SHOWN = 3
+_SHOWN, _NAMED = 3, 6
+"""Findings of a rule, and rules for each reason not to judge, that are printed without `--long`."""
 _WIDTH = 80
 
 
@@ -55,7 +56,11 @@ def verify(
         ),
     ] = None,
     long: Annotated[
-        bool, typer.Option("--long", help="Print each promise in full, below its rule.")
+        bool,
+        typer.Option(
+            "--long",
+            help="Print each promise in full, and the names of all rules that could not judge.",
+        ),
     ] = False,
     path: Annotated[
         Path | None,
@@ -237,7 +242,9 @@ def _show(run: Path, found: "Verification", *, long: bool) -> None:
             _print_wrapped(result.promise, style="dim")
         _show_findings(run, result)
     for reason, names in found.not_judged.items():
-        _print_wrapped(f"not judged, {reason}: {', '.join(names)}", indent="")
+        few = long or len(names) <= _NAMED
+        listed = ", ".join(names) if few else f"{len(names)} rules, which --long names"
+        _print_wrapped(f"not judged, {reason}: {listed}", indent="")
     green = "bold green" if found.has_tree else ""
     _print_wrapped(
         _total(len(judged), found), indent="", style=green if found.holds else "bold red"
