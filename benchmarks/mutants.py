@@ -206,7 +206,7 @@ def promises() -> dict[str, set[str]]:
     text = (ROOT / "docs/promises.md").read_text("utf-8").partition("\n## ")[0]
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     found = {row[0]: {name.strip(" `") for name in row[1].split(",")} for row in rows}
-    others = {"-", "rules", *(rule.name for rule in graph.RULES)}
+    others = {"---", "rules", *(rule.name for rule in graph.RULES)}
     return {promise: rules for promise, rules in found.items() if not rules <= others}
 
 
