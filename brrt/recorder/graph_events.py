@@ -153,8 +153,7 @@ class GraphEvents:
             if (at == to).any():
                 raise BrrtError(f"other must not be the node itself, {at[at == to][0]}")
             if cost is None:
-                q = nodes.q
-                total = self._robot.distance(q[at], q[to])
+                total = self._robot.distance(nodes.places(at), nodes.places(to))
             else:
                 total = costs_of(cost, len(at))
             fields = {"tree": tree, "node": at, "other": to, "cost": total}
@@ -198,7 +197,7 @@ class GraphEvents:
             at = self._node_rows("node", node, np.size(node), tree, low)
             to = self._node_rows("other", other, len(at), tree, low if q is not None else 0)
             free = fractions("part", part, len(at))
-            ends = nodes.q[to] if q is None else configurations("q", q, self._dof)
+            ends = nodes.places(to) if q is None else configurations("q", q, self._dof)
             if len(ends) != len(at):
                 raise BrrtError(f"q must have {len(at)} rows, not {len(ends)}")
             fields = {"tree": tree, "node": at, "other": to, "part": free, "q": ends}

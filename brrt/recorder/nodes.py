@@ -42,14 +42,21 @@ class Nodes:
     def __len__(self) -> int:
         return len(self.parent)
 
-    @property
-    def q(self) -> Floats:
-        """Their configurations, shape (n, dof)."""
-        return np.array(self._q).reshape(-1, self._dof)
-
     def place(self, node: int) -> Sequence[float]:
         """Return the configuration of a node."""
         return self._q[node * self._dof : (node + 1) * self._dof]
+
+    def places(self, nodes: Ints) -> Floats:
+        """Return the configurations of nodes, shape (n, dof)."""
+        # A view, which is gone before the array grows: a copy would take time for all nodes.
+        whole = (
+            np.frombuffer(self._q).reshape(-1, self._dof) if self._q else np.empty((0, self._dof))
+        )
+        return np.asarray(whole[nodes])
+
+    def costs(self, nodes: Ints) -> Floats:
+        """Return `cost` of nodes, shape (n,)."""
+        return np.asarray((np.frombuffer(self.cost) if self.cost else np.empty(0))[nodes])
 
     def cost_of(self, node: int) -> float:
         """Return a node's cost-to-come; infinite if no root is above it."""

@@ -452,12 +452,15 @@ class Recorder(GraphEvents):
         old = len(nodes)
         for parent in np.unique(up[(up >= 0) & (up < old)]).tolist() if nodes.loose else ():
             self._known_cost(nodes, parent)
-        far = self._robot.distance(np.concatenate([nodes.q, rows])[np.maximum(up, 0)], rows)
-        far = np.where(up >= 0, far, 0.0)
-        costs = nodes.cost[:]
-        for parent, length in zip(up.tolist(), far.tolist(), strict=True):
-            costs.append(length if parent < 0 else costs[parent] + length)
-        return np.array(costs[old:])
+        begins, known, new = rows.copy(), (up >= 0) & (up < old), np.flatnonzero(up >= old)
+        begins[known], begins[new] = nodes.places(up[known]), rows[up[new] - old]
+        far = np.asarray(self._robot.distance(begins, rows), np.float64)
+        cost = np.where(up >= 0, far, 0.0)
+        cost[known] += nodes.costs(up[known])
+        totals = cost.tolist()
+        for row, parent in zip(new.tolist(), (up[new] - old).tolist(), strict=True):
+            totals[row] += totals[parent]
+        return np.array(totals)
 
     def _now(self) -> int:
         return self._clock() - self._origin

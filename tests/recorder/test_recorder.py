@@ -373,3 +373,25 @@ def test_files_that_cannot_be_written(tmp_path: Path) -> None:
         record(tmp_path / "x.rrd", world=WORLD)
     with pytest.raises(BrrtError, match=r"nowhere/x\.mcap"):
         record(tmp_path / "nowhere" / "x.mcap", world=WORLD)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_default_costs_in_arrays_are_those_one_by_one(seed: int, tmp_path: Path) -> None:
+    """For parents before the array and within it, and for roots; one by one but for rounding."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(0, 10, (300, 2))
+    parent = np.array([-1, *(rng.integers(-1 if n % 50 == 0 else 0, n) for n in range(1, 300))])
+    ends, logs = {"start": q[0], "goal": (9.0, 9.0)}, []
+    for name, size in (("one", 1), ("few", 7), ("all", 300)):
+        with brrt.record(tmp_path / f"{name}.mcap", world="empty2d:size=10", **ends) as rec:
+            for first in range(0, 300, size):
+                part = slice(first, first + size)
+                if size == 1:
+                    rec.edge(q[first], int(parent[first]))
+                else:
+                    rec.edges(q[part], parent[part])
+        logs.append(brrt.read(tmp_path / f"{name}.mcap").events()[brrt.Kind.EDGE])
+    one, few, every = logs
+    for field in ("node", "parent", "cost", "q"):
+        assert np.array_equal(few[field], every[field])
+        assert np.allclose(one[field], every[field], rtol=1e-14, atol=0)
