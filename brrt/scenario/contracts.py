@@ -98,7 +98,10 @@ def registered_contracts(manifest: Manifest, world: World) -> tuple[Contract | N
 
 
 def contract_differences(manifest: Manifest, world: World) -> list[str] | None:
-    """Say where stated contracts differ from those of the registered planner.
+    """Say where stated contracts and claims differ from those of the registered planner.
+
+    A foreign planner may have a registered one's name and any claims; its contract does not say
+    that it is registered.
 
     Returns:
         A sentence for each difference; None where there are no two contracts to compare.
@@ -116,6 +119,11 @@ def contract_differences(manifest: Manifest, world: World) -> list[str] | None:
         for name in ours.keys() | theirs.keys()
         if not _equal(ours[name], theirs[name])
     ]
+    if any(stated.planner.registered for stated, _ in known):
+        found += [
+            f"the recording claims {name}: {value}; the registered planner claims nothing"
+            for name, value in manifest.claims.stated().items()
+        ]
     return sorted(found) if known else None
 
 

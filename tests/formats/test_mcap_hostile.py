@@ -137,6 +137,11 @@ SCHEMAS: dict[str, tuple[Callable[[str], str], str]] = {
     "one number": (lambda t: t.replace("float64[2]", "float64[1]"), "the layout of its schema"),
     "other type": (lambda t: t.replace("uint8 tree", "float32 tree"), "no such field 'tree'"),
     "field twice": (lambda t: t + "uint8 iteration\n", "the schema of"),
+    "iteration gone": (lambda t: t.replace("iteration", "iterations"), "no such field 'iteration'"),
+    "sequence": (
+        lambda t: t.replace("64 cost ", "64 x ") + "float64[] cost\n" if " parent" in t else t,
+        "no such field 'cost'",
+    ),
     "field gone": (lambda t: t.replace("tree", "bush"), "no such field 'tree'"),
     "text": (lambda _: "string name\n", "unsupported message field"),
     "itself": (lambda t: t + "brrt_msgs/Phase phase\n", "unsupported message field"),

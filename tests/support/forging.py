@@ -42,7 +42,9 @@ def split(raw: bytes) -> Parts:
         content = raw[at + 9 : at + 9 + length]
         if opcode not in _KINDS:
             break
-        found.append(_KINDS[opcode].read(ReadDataStream(BytesIO(content))))
+        # Stock mcap must be told how long a message is.
+        length_of = (length,) if opcode == Opcode.MESSAGE else ()
+        found.append(_KINDS[opcode].read(ReadDataStream(BytesIO(content)), *length_of))
         at += 9 + length
     return found
 

@@ -230,13 +230,13 @@ class Channel:
         table = np.empty(len(block), table_dtype(self.kind, dof))
         table["seq"] = block["seq"]
         table["t"] = block["log_time"].astype(np.int64) - epoch_ns
-        table["iteration"] = block["iteration"]
-        for name in (f.name for f in FIELDS[self.kind]):
-            if name == layout.sequence:
+        types = {"iteration": "", **{f.name: f.type for f in FIELDS[self.kind]}}
+        for name, type_ in types.items():
+            if name == layout.sequence and type_ == "q[]":
                 for i, offset in enumerate(offsets):
                     begin = int(offset) + layout.sequence_at()
                     table[name][i] = _sequence(raw, begin, int(block[name][i]), dof)
-            elif not _fits(block.dtype, table.dtype, name):
+            elif type_ == "q[]" or not _fits(layout, table.dtype, name):
                 raise BrrtError(f"the schema of {self.kind.label} has no such field {name!r}")
             else:
                 table[name] = block[name]
@@ -251,9 +251,11 @@ def _sequence(raw: bytes, begin: int, count: int, dof: int) -> NDArray[np.float6
     return np.frombuffer(raw, "<f8", count, begin).reshape(-1, dof).copy()
 
 
-def _fits(there: np.dtype[Any], wanted: np.dtype[Any], name: str) -> bool:
+def _fits(layout: Layout, wanted: np.dtype[Any], name: str) -> bool:
     """Whether a field is there with as many numbers, and of a type that holds no others."""
-    if name not in (there.names or ()):
+    if name == layout.sequence or name not in (layout.record.names or ()):
         return False
-    a, b = there[name], wanted[name]
-    return a.shape == b.shape and np.can_cast(a.base, b.base)
+    a, b = layout.record[name], wanted[name]
+    # Iterations are unsigned in files; those beyond int64 are refused as negative ones.
+    casting: Any = "same_kind" if name == "iteration" else "safe"
+    return a.shape == b.shape and np.can_cast(a.base, b.base, casting)

@@ -25,6 +25,9 @@ FOOTER_BYTES = 29
 CHECKSUM = "crc32"
 """Name of the text that is the checksum of the others in a Metadata record."""
 
+_MOST_FIELDS = 10_000
+"""Texts of a Metadata record; those of a recording have some dozens."""
+
 _BLOCK = 1 << 20
 _MOST_BETWEEN = 1 << 17
 """Records between two chunks: there are 65,536 channels, and each may have an index."""
@@ -126,12 +129,24 @@ def parse(kind: Any, data: bytes) -> Any:
         raise BrrtError(f"a wrong {kind.__name__} record ({str(error) or repr(error)})") from None
 
 
+def _check_fields(data: bytes) -> None:
+    """Check how many fields there are, before stock mcap spends seconds on a million of them."""
+    lengths, at, count = struct.Struct("<I"), 0, -2  # the name, and the length of all, come first
+    while at + lengths.size <= len(data):
+        if count > 2 * _MOST_FIELDS:
+            raise BrrtError(f"a Metadata record has over {_MOST_FIELDS:,} fields")
+        (length,) = lengths.unpack_from(data, at)
+        at += lengths.size + (length if count != -1 else 0)
+        count += 1
+
+
 def parse_metadata(data: bytes) -> records.Metadata:
     """Read named texts; their checksum, if they have one, is checked and removed.
 
     Raises:
         BrrtError: They are damaged.
     """
+    _check_fields(data)
     metadata: records.Metadata = parse(records.Metadata, data)
     stated = metadata.metadata.pop(CHECKSUM, None)
     if stated is not None and stated != with_checksum(metadata.metadata)[CHECKSUM]:

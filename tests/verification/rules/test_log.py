@@ -1,10 +1,11 @@
 """Recordings that break rules about any log."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from brrt import Kind
+from brrt import Claims, Kind
 from tests.support.cases import (
     FREE,
     GROWTH,
@@ -55,6 +56,8 @@ DOCTORED: list[Doctored] = [
      {"path costs", "paths in trees", "shortcuts", "smoothed", "random pairs", "paths free"}),
     ("contract", "", on("rrt", lambda c: c.with_stated(stops=None)), set()),
     ("contract", "", on("rrt-star", lambda c: c.with_stated(draws=None)), set()),
+    ("contract", "the recording claims edges: assumed", on("rrt", lambda c: replace(c,
+     manifest=replace(c.manifest, claims=Claims(edges="assumed")))), set()),
 ]  # fmt: skip
 
 
