@@ -108,7 +108,7 @@ def verify(
 
     brrt verify --path path.csv --world map.yaml --robot lorry.json
     """
-    from brrt.errors import BrrtError
+    from brrt.errors import BrrtError, RecordingError
 
     alone = {"--world": world, "--robot": robot, "--start": start, "--goal": goal, "--out": picture}
     of_run = {"a recording": run, "--partial": partial, "--rerun": rerun, "--long": long}
@@ -132,8 +132,13 @@ def verify(
     recording = open_run(run, partial=partial)
     if partial and _lacks_events(recording):
         recording = replace(recording, result=None)
-    with ProgressBar(None, "judging").running():
-        found = verify(recording)
+    try:
+        with ProgressBar(None, "judging").running():
+            found = verify(recording)
+    except RecordingError:
+        raise  # it names the file
+    except BrrtError as error:
+        raise BrrtError(f"{run}: {error}") from None
     again = _reproduced(recording, tolerance) if rerun else None
     _note_differences(recording)
     if as_json:

@@ -123,7 +123,12 @@ class Query:
             BrrtError: Start or goal is not free there, or the robot's definition is damaged.
         """
         ends = replace(manifest.scenario, start=manifest.start, goal=manifest.goal)
-        return cls.of(ends, world, manifest.make_robot())
+        robot = manifest.make_robot()
+        try:
+            return cls.of(ends, world, robot)
+        except BrrtError as error:
+            what, _, _ = str(error).partition(";")
+            raise BrrtError(f"the manifest or the world is damaged: {what}") from None
 
     @property
     def dof(self) -> int:
