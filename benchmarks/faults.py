@@ -1,11 +1,14 @@
 """Kill runs while they record, and damage recordings: what is left, and what a reader says of it.
 
-    python benchmarks/faults.py [--kills 200] [--copies 2000] [--seed 0] [--first 0]
+    python benchmarks/faults.py [--kills 200] [--foreign 50] [--copies 2000] [--seed 0] [--first 0]
 
 Kills: a run that records at full speed into both files is killed (SIGKILL) at a random moment. It
 notes how many events it has handed over, and the time of the last. The .mcap must have them but
 for at most a second or a chunk, and `brrt recover` must make a file of them that `brrt verify` and
 stock mcap take. The .rrd must be refused with a line that names the .mcap.
+
+Foreign: the same of a program that records an RRT of its own by `brrt.record`, one event at a time.
+Its .mcap must have all but the last half second.
 
 Copies: bytes are flipped, blocks swapped, doubled, blanked or cut off, in .mcap files of runs that
 ended and of runs that were killed. Each copy must read as the original does, or as the beginning
@@ -20,6 +23,7 @@ progress on stderr.
 import argparse
 import contextlib
 import io
+import itertools
 import os
 import random
 import resource
@@ -30,14 +34,28 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from subprocess import PIPE, Popen
 from typing import IO, Any, cast
 
+import numpy as np
 from mcap.reader import make_reader
+from numpy.typing import NDArray
 
-from brrt import BrrtError, Events, McapSink, Run, Scenario, first_difference, read
+import brrt
+from brrt import (
+    BrrtError,
+    Events,
+    McapSink,
+    Run,
+    Scenario,
+    World,
+    first_difference,
+    make_world,
+    read,
+)
 from brrt.formats.background import BackgroundSink
 from brrt.formats.recover import recover
 from brrt.replay.metrics import Metrics
@@ -52,7 +70,7 @@ SMALL = (
     Scenario(world="circles2d", seed=2, planner="rrt-star", iterations=400),
 )
 PATIENCE_S = 5.0
-LOSS_S, CHUNK = 1.0, 1 << 16
+LOSS_S, HALF_S, CHUNK = 1.0, 0.5, 1 << 16
 WAYS = ("flip", "flip", "flip", "cut", "swap", "blank", "double")
 REPORTS, INTERRUPTED = 20, 130
 MEMORY = 6 << 30
@@ -80,14 +98,46 @@ def record(scenario: Scenario, folder: Path, batch: int = 8192) -> None:
     os.close(handed)
 
 
-def fork_runs() -> None:
+def record_foreign(folder: Path) -> None:
+    """Record an RRT in plain Python, without end, one event at a time; note what was recorded."""
+    world = make_world(ENDLESS.world)
+    rng = np.random.default_rng(int.from_bytes(os.urandom(4)))
+    handed = os.open(folder / "handed", os.O_WRONLY | os.O_CREAT)
+    began = time.perf_counter_ns()
+    with brrt.record(folder / NAMES[0], world=world, planner="foreign") as rec:
+        nodes = [np.array(world.start)]
+        rec.edge(nodes[0])
+        for number in itertools.count(1):
+            q = rng.uniform(world.lower, world.upper)
+            rec.sample(q)
+            near = int(np.linalg.norm(np.array(nodes[-200:]) - q, axis=1).argmin())
+            near += max(0, len(nodes) - 200)
+            way = q - nodes[near]
+            new = nodes[near] + way * min(1.0, 0.05 / float(np.linalg.norm(way)))
+            if motion_free(world, nodes[near], new):
+                rec.edge(new, near)
+                nodes.append(new)
+            else:
+                rec.reject(new, near)
+            os.pwrite(handed, f"{2 * number} {time.perf_counter_ns() - began}\n".encode(), 0)
+
+
+def motion_free(world: World, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    """Whether a motion touches no ball and stays inside the world."""
+    middle, reach = (a + b) / 2, float(np.linalg.norm(b - a)) / 2
+    balls = np.asarray(world.balls)
+    away = np.linalg.norm(balls[:, :2] - middle, axis=1) > balls[:, 2] + reach
+    return bool(away.all() and world.inside(b))
+
+
+def fork_runs(work: Callable[[Path], None]) -> None:
     """Fork a run for each folder on stdin: importing and compiling takes long."""
     Run(ENDLESS)
     for line in sys.stdin:
         child = os.fork()
         if not child:
             try:
-                record(ENDLESS, Path(line.strip()))
+                work(Path(line.strip()))
             finally:
                 os._exit(1)  # it is to be killed; it must not answer in our name
         print(child, flush=True)
@@ -125,7 +175,7 @@ def command(*args: object) -> tuple[int, str]:
     return 0, said.getvalue()
 
 
-def judge_kill(folder: Path, figures: Counter[str]) -> list[str]:
+def judge_kill(folder: Path, figures: Counter[str], loss_s: float) -> list[str]:
     """Return what is wrong with the files that a killed run left."""
     note = folder / "handed"
     words = note.read_text().split() if note.exists() else []
@@ -145,7 +195,7 @@ def judge_kill(folder: Path, figures: Counter[str]) -> list[str]:
     lost, lost_s = max(0, handed - len(events)), max(0.0, (t - events.last.t) / 1e9)
     figures["events lost"] += lost
     figures["most time lost, ms"] = max(figures["most time lost, ms"], round(1e3 * lost_s))
-    if lost_s > LOSS_S and lost > CHUNK:
+    if lost_s > loss_s and (lost > CHUNK or loss_s < LOSS_S):
         wrong.append(f"{mcap.name} lacks the last {lost_s:.2f} s, {lost:,} events")
     return wrong + judge_recovery(mcap, events)
 
@@ -177,11 +227,20 @@ def draws(seed: int, what: str, number: int) -> random.Random:
     return random.Random(f"{seed} {what} {number}")  # noqa: S311 - no secret
 
 
-def kills(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
+def foreign(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
+    """Kill a program that uses `brrt.record` for each number."""
+    return kills(numbers, seed, figures, "--fork-foreign", HALF_S)
+
+
+def kills(
+    numbers: range,
+    seed: int,
+    figures: Counter[str],
+    option: str = "--fork-runs",
+    loss_s: float = LOSS_S,
+) -> Iterator[str]:
     """Kill a run for each number; yield what is wrong with what they left."""
-    with Popen(
-        [sys.executable, __file__, "--fork-runs"], stdin=PIPE, stdout=PIPE, text=True
-    ) as process:
+    with Popen([sys.executable, __file__, option], stdin=PIPE, stdout=PIPE, text=True) as process:
         orders, answers = cast("IO[str]", process.stdin), cast("IO[str]", process.stdout)
         for number in counted(numbers, "kills"):
             with tempfile.TemporaryDirectory() as name:
@@ -191,7 +250,7 @@ def kills(numbers: range, seed: int, figures: Counter[str]) -> Iterator[str]:
                 time.sleep(draws(seed, "kill", number).uniform(0, 2.0))
                 os.kill(child, signal.SIGKILL)
                 answers.readline()
-                wrong = judge_kill(Path(name), figures)
+                wrong = judge_kill(Path(name), figures, loss_s)
             figures["killed"] += 1
             yield from (f"kill {number}: {line}" for line in wrong)
         orders.close()
@@ -359,17 +418,20 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--foreign", type=int, default=50)
     parser.add_argument("--copies", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0, help="number of the first kill and copy")
     parser.add_argument("--fork-runs", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--fork-foreign", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
-    if args.fork_runs:
+    if args.fork_runs or args.fork_foreign:
         with contextlib.suppress(KeyboardInterrupt):
-            fork_runs()
+            fork_runs(partial(record, ENDLESS) if args.fork_runs else record_foreign)
         return 0
     findings = 0
-    for what, count in ((kills, args.kills), (copies, args.copies)):
+    counts = (kills, args.kills), (foreign, args.foreign), (copies, args.copies)
+    for what, count in counts:
         numbers = range(args.first, count)
         if not numbers:
             continue

@@ -30,6 +30,9 @@ class Nodes:
     def __init__(self, dof: int) -> None:
         self._dof = dof
         self._q, self.parent, self.cost = array("d"), array("q"), array("d")
+        # Looked up once: `join` is called for each edge.
+        self._add_q, self._add_parent = self._q.extend, self.parent.append
+        self._add_cost = self.cost.append
         # The children of each node; None until a rewire needs them.
         self._children: list[set[int]] | None = None
         self.loose: set[int] = set()
@@ -41,6 +44,11 @@ class Nodes:
 
     def __len__(self) -> int:
         return len(self.parent)
+
+    def straight(self, node: int, q: Sequence[float]) -> float:
+        """Return the straight distance of a node from a configuration."""
+        at = node * self._dof
+        return math.dist(self._q[at : at + self._dof], q)
 
     def place(self, node: int) -> Sequence[float]:
         """Return the configuration of a node."""
@@ -70,9 +78,9 @@ class Nodes:
 
     def join(self, q: Sequence[float], parent: int, cost: float) -> None:
         """Add a node."""
-        self._q.extend(q)
-        self.parent.append(parent)
-        self.cost.append(cost)
+        self._add_q(q)
+        self._add_parent(parent)
+        self._add_cost(cost)
         if self._children is not None:
             self._children.append(set())
             if parent >= 0:

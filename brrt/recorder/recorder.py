@@ -36,8 +36,11 @@ from brrt.scenario.query import Query
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_LATE_S = 0.2
-"""How long an event may wait while the planner records nothing."""
+_LATE_S = 0.05
+"""How long an event may wait here; files keep it for 0.3 s more, and half a second is promised."""
+
+_SAMPLE, _EDGE = Kind.SAMPLE, Kind.EDGE
+"""Looking up a member of an enumeration takes a twentieth of what an event may take."""
 
 _MOST = 2**31 - 1
 """Nodes and cells have numbers of 32 bits."""
@@ -59,13 +62,14 @@ class Recorder(GraphEvents):
         self._sink, self._robot, self._dof = sink, query.robot, query.dof
         self._is_point = isinstance(query.robot, Point)
         self._lock = threading.RLock()
-        self._rows, self._cells = Rows(self._dof), 0
+        origin = 0 if clock else time.perf_counter_ns()
+        measured = clock or time.perf_counter_ns
+        self._rows, self._cells = Rows(self._dof, measured, origin, self._make_room), 0
         self._trees = Nodes(self._dof), Nodes(self._dof)
         self._iteration, self._counts_samples = 0, True
         self._solved = self._closed = False
         self._error: BaseException | None = None
-        self._origin = 0 if clock else time.perf_counter_ns()
-        self._clock = clock or time.perf_counter_ns
+        self._origin = origin
         self._put(Kind.PHASE, 0.0, None, Phase.PLAN, Status.BEGIN)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._flush_late, name="brrt flush", daemon=True)
@@ -92,10 +96,11 @@ class Recorder(GraphEvents):
         """Record that a configuration was drawn, shape (dof,)."""
         values, origin = configuration(q, self._dof), choice("source", Source, source)
         with self._lock:
-            self._nodes(tree)
-            self._make_room()
-            self._iteration += self._counts_samples
-            self._put(Kind.SAMPLE, 0.0, values, tree, origin)
+            if tree != 0 or tree.__class__ is not int:
+                self._nodes(tree)
+            iteration = self._iteration + self._counts_samples
+            self._rows.put(_SAMPLE, iteration, 0.0, values, tree, origin)
+            self._iteration = iteration
 
     def edge(
         self,
@@ -117,9 +122,14 @@ class Recorder(GraphEvents):
         """
         values = configuration(q, self._dof)
         with self._lock:
-            nodes = self._nodes(tree)
+            nodes = self._trees[0] if tree.__class__ is int and not tree else self._nodes(tree)
             number = len(nodes.parent)
-            up = -1 if parent is None else self._node("parent", parent, tree, low=-1)
+            if parent is None:
+                up = -1
+            elif parent.__class__ is int and 0 <= parent < number and not nodes.removed:
+                up = parent
+            else:
+                up = self._node("parent", parent, tree, low=-1)
             if node is not None and node != number:
                 raise BrrtError(f"node of tree {tree} must be {number}, its next, not {node!r:.60}")
             if cost is not None:
@@ -128,8 +138,11 @@ class Recorder(GraphEvents):
                 total = 0.0
             else:
                 above = self._known_cost(nodes, up) if nodes.loose else nodes.cost[up]
-                total = above + self._far(nodes.place(up), values)
-            self._put(Kind.EDGE, total, values, tree, number, up)
+                if self._is_point:
+                    total = above + nodes.straight(up, values)
+                else:
+                    total = above + self._far(nodes.place(up), values)
+            self._rows.put(_EDGE, self._iteration, total, values, tree, number, up)
             nodes.join(values, up, total)
             return number
 
@@ -209,8 +222,7 @@ class Recorder(GraphEvents):
         with self._lock:
             due = Stage.IMPROVED if self._solved else Stage.RAW
             kept = choice("stage", Stage, due if stage is None else stage)
-            self._make_room()
-            self._rows.put_path(self._now(), self._iteration, kept, length, rows)
+            self._rows.put_path(self._iteration, kept, length, rows)
             self._solved = True
 
     def expand(self, cell: int, parent: int, q: ArrayLike, cost: float) -> None:
@@ -339,7 +351,7 @@ class Recorder(GraphEvents):
             events = check_events(columns, self._trees, self._cells, self._iteration)
             if not len(events):
                 return
-            now = self._now()
+            now = self._rows.now()
             t = columns.t - self._origin if self._origin else np.full(len(events), now)
             columns = replace(columns, t=rising(t, self._rows.last_t))
             self._put_columns(columns, events[Kind.PATH])
@@ -360,10 +372,9 @@ class Recorder(GraphEvents):
                 self._make_room()
                 done += self._rows.put_columns(columns, slice(done, stop))
             if path is not None:
-                self._make_room()
                 self._rows.put_path(
-                    int(columns.t[stop]), int(path["iteration"]), int(path["stage"]),
-                    float(path["cost"]), path["waypoints"].copy(),
+                    int(path["iteration"]), int(path["stage"]), float(path["cost"]),
+                    path["waypoints"].copy(), int(columns.t[stop]),
                 )  # fmt: skip
                 done += 1
 
@@ -391,7 +402,7 @@ class Recorder(GraphEvents):
                 self._flush()
             except BaseException as error:  # noqa: BLE001 - raised below, once all is closed
                 self._error = error
-            self._closed = True
+            self._closed, self._rows.room = True, 0
         log.closed(self)
         self._stop.set()
         self._thread.join()
@@ -462,9 +473,6 @@ class Recorder(GraphEvents):
             totals[row] += totals[parent]
         return np.array(totals)
 
-    def _now(self) -> int:
-        return self._clock() - self._origin
-
     def _check_open(self) -> None:
         """Raise if the sink failed, or if the recording is closed."""
         if self._closed:
@@ -473,15 +481,14 @@ class Recorder(GraphEvents):
             raise self._error
 
     def _make_room(self) -> None:
+        """Hand a full batch over; raise if no more may be recorded."""
         self._check_open()
         if self._rows.count == ROOM:
             self._flush()
 
     def _put(self, kind: Kind, real: float, q: Sequence[float] | None, *integers: int) -> None:
         """Record an event; see `Rows.put`."""
-        self._make_room()
-        t = self._clock() - self._origin
-        self._rows.put(kind, t, self._iteration, real, q, *integers)
+        self._rows.put(kind, self._iteration, real, q, *integers)
 
     def _put_many(self, kind: Kind, count: int, fields: dict[str, Any], iteration: Any) -> None:
         """Record events of one kind; see `Rows.put_many`."""
@@ -489,7 +496,7 @@ class Recorder(GraphEvents):
         while done < count:
             self._make_room()
             part = slice(done, count)
-            done += self._rows.put_many(kind, self._now(), iteration, fields, part)
+            done += self._rows.put_many(kind, iteration, fields, part)
 
     def _flush(self) -> None:
         if self._rows.count:
@@ -503,4 +510,4 @@ class Recorder(GraphEvents):
                     try:
                         self._flush()
                     except BaseException as error:  # noqa: BLE001 - raised at the next call
-                        self._error = error
+                        self._error, self._rows.room = error, 0

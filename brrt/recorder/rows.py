@@ -1,7 +1,7 @@
 """A batch of events as rows, each written by one `struct.pack_into`."""
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,15 +42,23 @@ class Rows:
 
     Args:
         dof: Numbers in a configuration.
+        clock: Returns the time in ns.
+        origin: What it returned when the run began.
+        make_room: Called before an event for which there is no room; takes the others.
 
     Attributes:
-        count: How many there are, `ROOM` at most.
+        count: How many there are.
+        room: How many there may be; 0 once no more may be recorded.
         last_t: Time of the last event in ns.
     """
 
-    def __init__(self, dof: int) -> None:
+    def __init__(
+        self, dof: int, clock: Callable[[], int], origin: int, make_room: Callable[[], None]
+    ) -> None:
         packed = row_struct(dof)
         self._dof, self._pack, self._size = dof, packed.pack_into, packed.size
+        self._clock, self._origin, self._make_room = clock, origin, make_room
+        self.room = ROOM
         self._nowhere = (0.0,) * dof
         self._first, self.last_t = 0, -1
         self._clear()
@@ -61,32 +69,40 @@ class Rows:
         self._points: list[Floats] = []
         self._points_count = 0
 
+    def now(self) -> int:
+        """Return the time in ns since the run began."""
+        return self._clock() - self._origin
+
     def put(
         self,
         kind: Kind,
-        t: int,
         iteration: int,
         real: float,
         q: Sequence[float] | None,
         first: int = 0,
         second: int = 0,
         third: int = 0,
+        t: int | None = None,
     ) -> None:
-        """Append an event, for which there must be room.
+        """Append an event. It does all by itself: a call more is a tenth of its time.
 
         Args:
             kind: What happened.
-            t: Time in ns; an event is at least 1 ns after the one before.
             iteration: The planner's count.
             real: The kind's float, 0 without one.
             q: The kind's configuration, shape (dof,); None without one.
             first: The first of the kind's whole numbers, in the order of `events.FIELDS`.
             second: The second of them.
             third: The third.
+            t: Time in ns, by default now; an event is at least 1 ns after the one before.
 
         Raises:
             BrrtError: A number has the wrong type, or is too large.
         """
+        if self.count >= self.room:
+            self._make_room()
+        if t is None:
+            t = self._clock() - self._origin
         if t <= self.last_t:
             t = self.last_t + 1
         try:
@@ -99,21 +115,22 @@ class Rows:
         self.last_t = t
         self.count += 1
 
-    def put_path(self, t: int, iteration: int, stage: int, cost: float, waypoints: Floats) -> None:
-        """Append a path, whose waypoints stay in the batch of its event."""
+    def put_path(
+        self, iteration: int, stage: int, cost: float, waypoints: Floats, t: int | None = None
+    ) -> None:
+        """Append a path, whose waypoints stay in the batch of its event; see `put`."""
+        if self.count >= self.room:
+            self._make_room()
         first = self._points_count
-        self.put(Kind.PATH, t, iteration, cost, None, stage, first, len(waypoints))
+        self.put(Kind.PATH, iteration, cost, None, stage, first, len(waypoints), t)
         self._points.append(waypoints)
         self._points_count += len(waypoints)
 
-    def put_many(
-        self, kind: Kind, t: int, iteration: Any, fields: Mapping[str, Any], part: slice
-    ) -> int:
-        """Append as many events of one kind as there is room for; return how many.
+    def put_many(self, kind: Kind, iteration: Any, fields: Mapping[str, Any], part: slice) -> int:
+        """Append as many events of one kind as there is room for, 1 ns apart; return how many.
 
         Args:
             kind: What happened.
-            t: Time of the first one in ns; the others follow 1 ns apart.
             iteration: Of each, shape (n,), or one for all.
             fields: Each field, shape (n,) or (n, dof), or one value for all.
             part: Which of the n to append.
@@ -121,7 +138,7 @@ class Rows:
         count: int = min(part.stop - part.start, ROOM - self.count)
         part = slice(part.start, part.start + count)
         rows = self._rows[self.count : self.count + count]
-        first = max(t, self.last_t + 1)
+        first = max(self.now(), self.last_t + 1)
         rows["t"] = np.arange(first, first + count)
         rows["iteration"] = iteration[part] if np.ndim(iteration) else iteration
         rows["kind"] = kind

@@ -57,6 +57,8 @@ def cost_of(cost: Any) -> float:
     Raises:
         BrrtError: It is not a finite number.
     """
+    if cost.__class__ is float and -GREATEST < cost < GREATEST:  # the usual case
+        return cost
     if isinstance(cost, _REAL):
         value = float(cost)
         if -GREATEST < value < GREATEST:
@@ -136,7 +138,7 @@ def choice(name: str, choices: type[Named], value: Any) -> int:
     Raises:
         BrrtError: There is no such member.
     """
-    if isinstance(value, choices):  # the usual case, and the fastest
+    if value.__class__ is choices:  # the usual case, and the fastest
         return value
     if isinstance(value, str):
         for each in choices:
