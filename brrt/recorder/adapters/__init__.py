@@ -1,7 +1,7 @@
 """Adapters: record the solves of planners in scripts that are not changed, for `brrt record`."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from brrt.recorder.adapters.solves import Solves
 from brrt.registry import Registry
@@ -29,5 +29,3 @@ class Adapter(Protocol):
 ADAPTERS: Registry[Callable[[], Adapter]] = Registry({})
 
 __all__ = ["ADAPTERS", "Adapter", "Solves"]
-
-

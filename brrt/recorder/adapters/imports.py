@@ -21,7 +21,7 @@ class _Finder:
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Return what the finders after this one find, with a loader that calls back."""
-        rest = sys.meta_path[sys.meta_path.index(self) + 1 :]  # type: ignore[arg-type]
+        rest = sys.meta_path[sys.meta_path.index(self) + 1 :]
         for finder in rest:
             find = getattr(finder, "find_spec", None)
             spec: ModuleSpec | None = find(name, path, target) if find else None
@@ -56,5 +56,5 @@ def when_imported(wanted: str | Wanted, call: OnImport) -> Callable[[], None]:
         finder = _Finder(lambda spec: spec.name == name, call)
     else:
         finder = _Finder(wanted, call)
-    sys.meta_path.insert(0, finder)  # type: ignore[arg-type]
-    return partial(sys.meta_path.remove, finder)  # type: ignore[arg-type]
+    sys.meta_path.insert(0, finder)
+    return partial(sys.meta_path.remove, finder)
