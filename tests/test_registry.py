@@ -111,6 +111,7 @@ def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         (folder / name).write_text(text)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setattr(registry, "_reported", set())
+    monkeypatch.setattr(registry, "_report", registry._warn)
     every = (PLANNERS, ROBOTS, GENERATORS, LOADERS, REGISTERED)
     for each in every:
         monkeypatch.setattr(each, "_plugins", None)
