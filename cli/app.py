@@ -11,7 +11,7 @@ import typer
 from typer.main import get_command
 
 from .command import Command, Group
-from .console import SIGNALLED, Code, complain
+from .console import SIGNALLED, Code, complain, note
 from .streams import output_error, robust_streams
 
 _COMMANDS = {
@@ -115,6 +115,9 @@ def main(args: Sequence[str] | None = None) -> None:
 
 
 def _run(args: Sequence[str] | None) -> int:
+    from brrt.registry import on_broken
+
+    on_broken(note)
     try:
         return int(app(args, prog_name="brrt", standalone_mode=False) or 0)
     except (typer.Abort, KeyboardInterrupt):

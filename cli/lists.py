@@ -1,12 +1,14 @@
 """`brrt planners`, `brrt robots`: the registered planners and robots, and their parameters."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import console, print_json, print_line, print_rows
 from .options import Json
+
+if TYPE_CHECKING:
+    from brrt.registry import Registry
 
 Name = Annotated[str | None, typer.Argument(help="Show this one only.", show_default=False)]
 
@@ -39,27 +41,25 @@ def robots(name: Name = None, *, as_json: Json = False) -> None:
     _print("robot", ROBOTS, name, as_json=as_json)
 
 
-def described(registry: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return what each class of a registry is, and its parameters."""
-    return {
-        name: {"about": (kind.__doc__ or "").split("\n")[0], "params": kind.describe()}
-        for name, kind in registry.items()
-    }
+def described(registry: "Registry[Any]", name: str | None) -> dict[str, dict[str, Any]]:
+    """Return what each class of a registry is, the package it is from, and its parameters.
 
-
-def chosen(what: str, name: str | None, entries: dict[str, Any]) -> dict[str, Any]:
-    """Return all entries, or the named one alone.
-
-    Raises:
-        BrrtError: There is no entry of that name.
+    Args:
+        registry: The registry.
+        name: Only this one; nothing is returned if there is none of this name.
     """
-    from brrt.errors import unknown
-
     if name is None:
-        return entries
-    if name not in entries:
-        raise unknown(what, name, entries)
-    return {name: entries[name]}
+        kinds = registry.working()
+    else:
+        kinds = {name: registry[name]} if name in registry else {}
+    return {
+        name: {
+            "about": (kind.__doc__ or "").strip().split("\n")[0],
+            "package": registry.package(name),
+            "params": kind.describe(),
+        }
+        for name, kind in kinds.items()
+    }
 
 
 def print_described(entries: dict[str, dict[str, Any]]) -> None:
@@ -67,7 +67,7 @@ def print_described(entries: dict[str, dict[str, Any]]) -> None:
     from rich.markup import escape
 
     for name, entry in entries.items():
-        console().print(f"[bold]{name}[/bold]  {escape(entry['about'])}")
+        console().print(f"[bold]{escape(name)}[/bold]  {escape(about(entry))}")
         if entry["params"]:
             rows = [{**row, "name": f"  {row['name']}"} for row in entry["params"]]
             units = any(row["unit"] for row in rows)
@@ -75,8 +75,18 @@ def print_described(entries: dict[str, dict[str, Any]]) -> None:
         print_line()
 
 
-def _print(what: str, registry: Mapping[str, Any], name: str | None, *, as_json: bool) -> None:
-    entries = chosen(what, name, described(registry))
+def about(entry: dict[str, Any]) -> str:
+    """Return what an entry is, in a line; a plug-in's with its package."""
+    package = "" if entry["package"] == "brrt" else f" (from {entry['package']})"
+    return f"{entry['about']}{package}"
+
+
+def _print(what: str, registry: "Registry[Any]", name: str | None, *, as_json: bool) -> None:
+    from brrt.errors import unknown
+
+    entries = described(registry, name)
+    if name is not None and not entries:
+        raise unknown(what, name, registry)
     if as_json:
         print_json(entries)
     else:

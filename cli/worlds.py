@@ -20,7 +20,7 @@ from .console import (
     print_pairs,
     print_rows,
 )
-from .lists import chosen, described, print_described
+from .lists import about, described, print_described
 from .options import Force, Json
 from .progress import ProgressBar
 
@@ -68,12 +68,16 @@ def list_worlds(
     as_json: Json = False,
 ) -> None:
     """List the world generators with their parameters, and the files that can be loaded."""
+    from brrt.errors import unknown
     from brrt.worlds import GENERATORS, LOADERS
 
-    generators, files = described(dict(GENERATORS)), described(dict(LOADERS))
-    for key, loader in LOADERS.items():
-        files[key] |= {"endings": list(loader.endings), "query": loader.queries}
-    entries = chosen("world", name, {**generators, **files})
+    generators = {} if name in LOADERS.own else described(GENERATORS, name)
+    files = {} if name in GENERATORS.own else described(LOADERS, name)
+    for key, entry in files.items():
+        entry |= {"endings": list(LOADERS[key].endings), "query": LOADERS[key].queries}
+    entries = {**generators, **files}
+    if name is not None and not entries:
+        raise unknown("world", name, [*GENERATORS, *LOADERS])
     if as_json:
         print_json(entries)
         return
@@ -91,12 +95,10 @@ def list_worlds(
 
 
 def _print_overview(generators: dict[str, Any], files: dict[str, Any]) -> None:
-    print_rows(
-        [{"name": key, "about": entry["about"]} for key, entry in generators.items()], whole=1
-    )
+    print_rows([{"name": key, "about": about(entry)} for key, entry in generators.items()], whole=1)
     print_line()
     rows = [
-        {"file": key, "about": f["about"], "endings": " ".join(f["endings"])}
+        {"file": key, "about": about(f), "endings": " ".join(f["endings"])}
         for key, f in files.items()
     ]
     print_rows(rows, whole=1)

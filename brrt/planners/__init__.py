@@ -1,6 +1,5 @@
 """Planners: one file and one line here adds one."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,19 +14,24 @@ from brrt.planners.lrta_star import LRTAStar
 from brrt.planners.rrt import RRT
 from brrt.planners.rrt_connect import RRTConnect
 from brrt.planners.rrt_star import RRTStar
+from brrt.registry import Registry
 from brrt.scenario.contract import Contract, PlannerInfo
 from brrt.scenario.query import Query
 from brrt.scenario.scenario import Scenario
 
-PLANNERS: Mapping[str, type[Planner]] = {
-    "rrt": RRT,
-    "rrt-connect": RRTConnect,
-    "bi-rrt": BiRRT,
-    "rrt-star": RRTStar,
-    "bi-rrt-star": BiRRTStar,
-    "lrta-star": LRTAStar,
-    "a-star": AStar,
-}
+PLANNERS: Registry[type[Planner]] = Registry(
+    {
+        "rrt": "brrt.planners.rrt:RRT",
+        "rrt-connect": "brrt.planners.rrt_connect:RRTConnect",
+        "bi-rrt": "brrt.planners.bi_rrt:BiRRT",
+        "rrt-star": "brrt.planners.rrt_star:RRTStar",
+        "bi-rrt-star": "brrt.planners.bi_rrt_star:BiRRTStar",
+        "lrta-star": "brrt.planners.lrta_star:LRTAStar",
+        "a-star": "brrt.planners.a_star:AStar",
+    },
+    group="brrt.planners",
+    base="brrt.planners.base.planner:Planner",
+)
 
 
 def make_planner(scenario: Scenario) -> Planner:
@@ -102,7 +106,7 @@ def state_contract(planner: Any, query: Query, given: Planner | None = None) -> 
         lattice = contract.lattice.as_dict()
         lengths |= {name: lattice[name] for name in ("cell", "diagonals", "max_move")}
     about = PlannerInfo(
-        registered=type(planner) in PLANNERS.values(),
+        registered=PLANNERS.has_imported(type(planner)),
         default_iterations=planner.default_iterations,
         bidirectional=planner.bidirectional,
         first_path=planner.first_path,

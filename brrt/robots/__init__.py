@@ -1,11 +1,11 @@
 """Robots in numpy: one file and one line here for each, and its counterpart in kernels/spaces."""
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
 from brrt.errors import BrrtError, unknown
 from brrt.files import is_file, read_text
+from brrt.registry import Registry
 from brrt.robots.chain import Chain
 from brrt.robots.opaque import Opaque
 from brrt.robots.point import Point
@@ -13,9 +13,17 @@ from brrt.robots.polygon import Polygon
 from brrt.robots.robot import SCHEMA, VERSION, Robot
 from brrt.settings import parse_pairs
 
-ROBOTS: Mapping[str, type[Robot]] = {
-    "point": Point, "polygon": Polygon, "chain": Chain, "opaque": Opaque,
-}  # fmt: skip
+ROBOTS: Registry[type[Robot]] = Registry(
+    {
+        "point": "brrt.robots.point:Point",
+        "polygon": "brrt.robots.polygon:Polygon",
+        "chain": "brrt.robots.chain:Chain",
+        "opaque": "brrt.robots.opaque:Opaque",
+    },
+    group="brrt.robots",
+    base="brrt.robots.robot:Robot",
+    label="kind",
+)
 
 _MAX_BYTES = 16_000_000
 
@@ -82,7 +90,8 @@ def robot_from_json(text: str) -> Robot:
         raise BrrtError(f"robot version {data.get('version')!r} is not {VERSION}; update brrt")
     kind = data.get("kind")
     if not isinstance(kind, str) or kind not in ROBOTS:
-        raise unknown("kind of robot", str(kind), ROBOTS)
+        why = unknown("kind of robot", str(kind), ROBOTS)
+        raise BrrtError(f"{why}; if it is a plug-in's, install its package")
     known = ("schema", "version", "kind", "name")
     return ROBOTS[kind].from_definition({k: v for k, v in data.items() if k not in known})
 

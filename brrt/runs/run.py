@@ -68,7 +68,7 @@ class Run:
             scenario = replace(scenario, world=world.name)
         if planner is not None:
             scenario = _named(scenario, planner)
-            self._foreign = type(planner) not in PLANNERS.values()
+            self._foreign = not PLANNERS.has_imported(type(planner))
         solver = make_planner(scenario) if planner is None else planner
         problem = Problem.of(scenario, world)
         if isinstance(solver, Planner):

@@ -3,7 +3,8 @@
 Recordings made before contracts were written, and those of other tools, state none; the planner
 registered under their name does. This is the only place where the reading wing reaches planners:
 by name, because an import statement would bring numba into it. Where planners cannot be imported,
-such a recording has no contract.
+such a recording has no contract. Only brrt's own planners are asked, and never a plug-in's: its
+recordings state their contract, and a name in a file must not import somebody's code.
 """
 
 import importlib
@@ -208,9 +209,9 @@ def _planners() -> Any:
 
 
 def _registered(scenario: Scenario) -> Any:
-    """Return the registered planner with a scenario's settings; None where there is none."""
+    """Return brrt's own planner with a scenario's settings; None where there is none."""
     planners = _planners()
-    if planners is None or scenario.planner not in planners.PLANNERS:
+    if planners is None or scenario.planner not in planners.PLANNERS.own:
         return None
     try:
         return planners.make_planner(scenario)

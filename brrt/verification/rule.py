@@ -35,6 +35,7 @@ class Rule:
         context: The recording.
         result: What the rule has found so far.
         left_out: What it could not judge, as `Verification.not_judged` states it; None for nothing.
+        failed: Whether it raised an error, as only rules of plug-ins may.
     """
 
     name: ClassVar[str]
@@ -48,6 +49,7 @@ class Rule:
         self.context = context
         self.result = RuleResult(self.name, self.promise)
         self.left_out: str | None = None
+        self.failed = False
 
     def window(self, events: Events, contract: Contract) -> None:
         """Judge the next events, all of which were made under one contract."""

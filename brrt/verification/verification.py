@@ -1,18 +1,21 @@
 """`verify`: judge a recording by rules."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from brrt.errors import BrrtError
 from brrt.events import Events, Kind
 from brrt.recording import Recording
+from brrt.registry import report_broken
 from brrt.scenario.contract import Contract
 from brrt.verification.context import Context
 from brrt.verification.result import Finding, RuleResult
 from brrt.verification.rule import ANY_PART, Rule
-from brrt.verification.rules import RULES
+from brrt.verification.rules import REGISTERED, RULES
 
 _WINDOW = 100_000
 """Events that rules judge together, at least."""
@@ -91,7 +94,7 @@ def verify(
     recording: Recording,
     *,
     contract: Contract | None = None,
-    rules: Sequence[type[Rule]] = RULES,
+    rules: Sequence[type[Rule]] | None = None,
 ) -> Verification:
     """Judge a recording by rules.
 
@@ -99,32 +102,63 @@ def verify(
         recording: The recording; if its `result` is None, the run's end is not judged.
         contract: What the planner promises; by default what the recording states, or else the
             registered planner of that name; without either only what all planners promise.
-        rules: The rules; by default all.
+        rules: The rules; by default all of brrt's and those of plug-ins.
 
     Raises:
         BrrtError: Start or goal is not free in the world, or the recording is damaged.
     """
     context = Context(recording, contract)
-    made = [rule(context) for rule in rules]
+    if rules is None:
+        rules = (*RULES, *REGISTERED.plugins().values())
+    made = [rule for rule in (_made(kind, context) for kind in rules) if rule is not None]
     active = [rule for rule in made if _applies(rule) and _unknown(rule) is None]
     firsts = [first for first, _ in context.stretches[1:]]
     with np.errstate(all="ignore"):  # a log may hold any numbers
         for events in _windows(recording.batches(), firsts):
             contract_now = context.advance(events)
             for rule in active:
-                rule.window(events, contract_now)
+                _call(rule, rule.window, events, contract_now)
         context.end()
         for rule in active:
             if _other_changes(rule):
                 rule.result = RuleResult(rule.name, rule.promise)
             else:
-                rule.finish()
+                _call(rule, rule.finish)
     results = [rule.result for rule in made]
     missing, kept = _not_judged(made), context.kept
     has_tree = not kept.kinds.isdisjoint({Kind.EDGE, Kind.LINK, Kind.EXPAND})
     return Verification(
         results, missing, kept.count, context.has_contract, context.is_cut, has_tree
     )
+
+
+def _made(kind: type[Rule], context: Context) -> Rule | None:
+    """Make a rule for a recording; None if it is a plug-in's that raises."""
+    try:
+        return kind(context)
+    except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
+        _check_plugin(kind, error)
+        return None
+
+
+def _call(rule: Rule, judge: Callable[..., None], *given: Any) -> None:
+    """Let a rule judge; one of a plug-in that raises is left out, and the others go on."""
+    if rule.failed:
+        return
+    try:
+        judge(*given)
+    except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
+        _check_plugin(type(rule), error)
+        rule.failed, rule.result = True, RuleResult(rule.name, rule.promise)
+        rule.left_out = "the rule itself fails"
+
+
+def _check_plugin(kind: type[Rule], error: Exception) -> None:
+    """Report an error of a plug-in's rule; raise that of a rule of brrt, or about the recording."""
+    if isinstance(error, BrrtError) or kind in RULES:
+        raise error
+    why = " ".join(f"it raises {error!r:.200}".split())
+    report_broken(f"rule {kind.name!r} of {kind.__module__} is left out: {why}")
 
 
 def _windows(batches: Iterable[Events], firsts: list[int]) -> Iterator[Events]:

@@ -59,7 +59,9 @@ GENERATORS: "Registry[type[Generator]]" = Registry(
         "room3d": f"{_GENERATORS}.scenes:Room3D",
         "hurdles3d": f"{_GENERATORS}.scenes:Hurdles3D",
         "offset3d": f"{_GENERATORS}.scenes:Offset3D",
-    }
+    },
+    group="brrt.worlds",
+    base=f"{_GENERATORS}.generator:Generator",
 )
 
 LOADERS: "Registry[type[Loader]]" = Registry(
@@ -72,7 +74,9 @@ LOADERS: "Registry[type[Loader]]" = Registry(
         "ros": f"{_LOADERS}.ros:RosMap",
         "image": f"{_LOADERS}.image:ImageMap",
         "geojson": f"{_LOADERS}.geojson:GeoJson",
-    }
+    },
+    group="brrt.loaders",
+    base=f"{_LOADERS}.loader:Loader",
 )
 """Where several have the same suffix and none recognises a file, the first of them reads it."""
 
@@ -148,14 +152,22 @@ def load_world(path: Path | str, params: Mapping[str, Any] | None = None, query:
 
 
 def _choose_loader(path: Path) -> tuple[str, "type[Loader]"]:
-    """Choose a loader by the suffix and, if several or none have it, by the file's first bytes."""
+    """Choose a loader by the suffix and, if several or none have it, by the file's first bytes.
+
+    Loaders of plug-ins are asked once none of brrt's own has the suffix or recognises the file.
+    """
     candidates = _loaders_for(path)
-    if len(candidates) == 1:
+    if len(candidates) == 1 and not is_file(path):
         return candidates[0]
     if is_there(path) and not is_file(path):
         raise BrrtError(f"{path}: not a regular file, and its name has no {_suffixes()}")
     head = read_bytes(path, "a world", _HEAD_BYTES, rest=False).removeprefix(BOM_UTF8)
-    for name, loader in candidates or LOADERS.items():
+    own = candidates or LOADERS.own.items()
+    found = next(((name, loader) for name, loader in own if loader.recognises(head)), None)
+    if found is not None:
+        return found
+    others = LOADERS.plugins()
+    for name, loader in _with_suffix(path, others) if candidates else others.items():
         if loader.recognises(head):
             return name, loader
     if candidates:
@@ -164,12 +176,19 @@ def _choose_loader(path: Path) -> tuple[str, "type[Loader]"]:
 
 
 def _loaders_for(path: Path) -> list[tuple[str, "type[Loader]"]]:
+    """Return brrt's own loaders for a suffix, or those of plug-ins if it has none."""
+    return _with_suffix(path, LOADERS.own) or _with_suffix(path, LOADERS.plugins())
+
+
+def _with_suffix(
+    path: Path, loaders: "Mapping[str, type[Loader]]"
+) -> list[tuple[str, "type[Loader]"]]:
     suffix = path.suffix.lower()
-    return [(name, loader) for name, loader in LOADERS.items() if suffix in loader.endings]
+    return [(name, loader) for name, loader in loaders.items() if suffix in loader.endings]
 
 
 def _suffixes() -> str:
-    suffixes = (suffix for loader in LOADERS.values() for suffix in loader.endings)
+    suffixes = (suffix for loader in LOADERS.working().values() for suffix in loader.endings)
     return ", ".join(dict.fromkeys(suffixes))
 
 

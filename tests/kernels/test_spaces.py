@@ -252,10 +252,14 @@ def test_every_robot_has_a_space_with_its_bounds(kind: str) -> None:
 
 
 def test_a_robot_without_a_space_cannot_plan() -> None:
-    """The error names the registry."""
+    """The error names the registry; one that extends another has the space of that."""
 
-    class Other(Point):
+    class Other(Robot):
         kind = "other"
+
+    class Extended(Point):
+        kind = "extended"
 
     with pytest.raises(BrrtError, match=r"robot other has no .* brrt.kernels.spaces.SPACES"):
         make_space(Other(), EMPTY)
+    assert type(make_space(Extended(), EMPTY)) is type(make_space(Point(), EMPTY))

@@ -33,10 +33,10 @@ def make_space(robot: Robot, world: World) -> Any:
         raise BrrtError(
             f"robot {robot.kind} cannot plan: its shape is unknown; choose point, polygon or chain"
         )
-    build = SPACES.get(type(robot))
-    if build is None:
+    kinds = [kind for kind in type(robot).__mro__ if kind in SPACES]  # itself, or what it extends
+    if not kinds:
         raise BrrtError(
             f"robot {robot.kind} has no configuration space for planning; add one to "
             "brrt.kernels.spaces.SPACES"
         )
-    return build(robot, world)
+    return SPACES[kinds[0]](robot, world)

@@ -1,5 +1,6 @@
 """All rules, one file for each subject. To add one, see `brrt.verification.rule`."""
 
+from brrt.registry import Registry
 from brrt.verification.rule import Rule
 from brrt.verification.rules import (
     graph,
@@ -22,3 +23,11 @@ _MODULES = (
 )  # fmt: skip
 
 RULES: tuple[type[Rule], ...] = tuple(rule for module in _MODULES for rule in module.RULES)
+
+REGISTERED: Registry[type[Rule]] = Registry(
+    {rule.name: f"{rule.__module__}:{rule.__qualname__}" for rule in RULES},
+    group="brrt.rules",
+    base="brrt.verification.rule:Rule",
+    label="name",
+)
+"""The rules by name, with those of plug-ins."""
