@@ -27,6 +27,7 @@ _COMMANDS = {
     "planners": "lists",
     "robots": "lists",
     "worlds": "worlds",
+    "include-dir": "include_dir",
 }
 """The module of each command. It is imported when the command runs, or for the list of all."""
 
@@ -39,7 +40,7 @@ class _Commands(Mapping[str, Any]):
         app = getattr(module, "app", None)
         if app is None:
             app = typer.Typer(add_completion=False)
-            app.command(name, cls=Command)(getattr(module, name))
+            app.command(name, cls=Command)(getattr(module, name.replace("-", "_")))
         return get_command(app)
 
     def __iter__(self) -> Iterator[str]:

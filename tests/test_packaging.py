@@ -31,3 +31,17 @@ def test_public_names_exist() -> None:
     assert {name: module for module, name, _ in said} == listed
     assert all(name == renamed for _, name, renamed in said)
     assert all(hasattr(brrt, name) for name in listed)
+
+
+def test_headers_are_package_data() -> None:
+    """The wheel has the C++ headers and the CMake package, which states the version."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    patterns = project["tool"]["setuptools"]["package-data"]["brrt"]
+    folder = ROOT / "brrt"
+    shipped = {path for pattern in patterns for path in folder.glob(pattern)}
+    for name in ("include", "cmake"):
+        files = {path for path in (folder / name).rglob("*") if path.is_file()}
+        assert files
+        assert files <= shipped
+    version = (folder / "cmake" / "brrtConfigVersion.cmake").read_text()
+    assert f'set(PACKAGE_VERSION "{project["project"]["version"]}")' in version
