@@ -1,6 +1,7 @@
 """`brrt verify`: whether a recording keeps what its planner promises."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from textwrap import TextWrapper
@@ -108,7 +109,7 @@ def verify(
 
     brrt verify --path path.csv --world map.yaml --robot lorry.json
     """
-    from brrt.errors import BrrtError, RecordingError
+    from brrt.errors import BrrtError
 
     alone = {"--world": world, "--robot": robot, "--start": start, "--goal": goal, "--out": picture}
     of_run = {"a recording": run, "--partial": partial, "--rerun": rerun, "--long": long}
@@ -132,13 +133,8 @@ def verify(
     recording = open_run(run, partial=partial)
     if partial and _lacks_events(recording):
         recording = replace(recording, result=None)
-    try:
-        with ProgressBar(None, "judging").running():
-            found = verify(recording)
-    except RecordingError:
-        raise  # it names the file
-    except BrrtError as error:
-        raise BrrtError(f"{run}: {error}") from None
+    with _naming(run), ProgressBar(None, "judging").running():
+        found = verify(recording)
     again = _reproduced(recording, tolerance) if rerun else None
     _note_differences(recording)
     if as_json:
@@ -176,6 +172,19 @@ def _check_fit(path: Path | None, alone: Mapping[str, Any], of_run: Mapping[str,
         if value:
             side = "needs --path" if path is None else "does not go with --path"
             raise BrrtError(f"{name} {side}; leave it out or see brrt verify --help")
+
+
+@contextmanager
+def _naming(run: Path) -> Iterator[None]:
+    """Let errors name the recording."""
+    from brrt.errors import BrrtError, RecordingError
+
+    try:
+        yield
+    except RecordingError:
+        raise  # it does
+    except BrrtError as error:
+        raise BrrtError(f"{run}: {error}") from None
 
 
 def _lacks_events(recording: "Recording") -> bool:
