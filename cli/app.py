@@ -24,6 +24,7 @@ _COMMANDS = {
     "export": "export",
     "view": "view",
     "recover": "recover",
+    "record": "record",
     "planners": "lists",
     "robots": "lists",
     "worlds": "worlds",
@@ -39,7 +40,8 @@ class _Commands(Mapping[str, Any]):
         app = getattr(module, "app", None)
         if app is None:
             app = typer.Typer(add_completion=False)
-            app.command(name, cls=Command)(getattr(module, name))
+            settings = getattr(module, "SETTINGS", None)
+            app.command(name, cls=Command, context_settings=settings)(getattr(module, name))
         return get_command(app)
 
     def __iter__(self) -> Iterator[str]:

@@ -261,5 +261,5 @@ def test_a_robot_without_a_space_cannot_plan() -> None:
         kind = "extended"
 
     with pytest.raises(BrrtError, match=r"robot other has no .* brrt.kernels.spaces.SPACES"):
-        make_space(Other(), EMPTY)
+        make_space(Other(), EMPTY)  # type: ignore[abstract]
     assert type(make_space(Extended(), EMPTY)) is type(make_space(Point(), EMPTY))
