@@ -24,6 +24,7 @@ _COMMANDS = {
     "export": "export",
     "view": "view",
     "recover": "recover",
+    "record": "record",
     "planners": "lists",
     "robots": "lists",
     "worlds": "worlds",
@@ -40,7 +41,8 @@ class _Commands(Mapping[str, Any]):
         app = getattr(module, "app", None)
         if app is None:
             app = typer.Typer(add_completion=False)
-            app.command(name, cls=Command)(getattr(module, name.replace("-", "_")))
+            settings, command = getattr(module, "SETTINGS", None), name.replace("-", "_")
+            app.command(name, cls=Command, context_settings=settings)(getattr(module, command))
         return get_command(app)
 
     def __iter__(self) -> Iterator[str]:

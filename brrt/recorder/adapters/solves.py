@@ -1,11 +1,13 @@
 """The recordings of a script's solves, which adapters open."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from brrt.errors import BrrtError
+from brrt.events import Status
 from brrt.recorder.record import record
 from brrt.recorder.recorder import Recorder
 
@@ -25,9 +27,17 @@ class Solves:
     stem: str
     on_failed: Callable[[str], None]
     files: list[Path] = field(default_factory=list)
+    _process: int = field(default_factory=os.getpid)
+    _opened: list[Recorder] = field(default_factory=list)
 
     def next_file(self) -> Path:
-        """Return the file of the next solve, for adapters that write it by themselves."""
+        """Return the file of the next solve, for adapters that write it by themselves.
+
+        Raises:
+            BrrtError: This is a child process, which would write the files of its parent.
+        """
+        if os.getpid() != self._process:
+            raise BrrtError("it runs in a child process; run it in the script's own process")
         self.files.append(self.folder / f"{self.stem}-{len(self.files) + 1}.mcap")
         return self.files[-1]
 
@@ -42,10 +52,11 @@ class Solves:
         """
         file = self.next_file()
         try:
-            return record(file, **given)
+            self._opened.append(record(file, **given))
         except BaseException:
             self.files.remove(file)
             raise
+        return self._opened[-1]
 
     def failed(self, what: str, error: BaseException) -> None:
         """Report that a solve is not recorded, or only in part; the script goes on.
@@ -56,3 +67,12 @@ class Solves:
         """
         reason = str(error) if isinstance(error, BrrtError) else repr(error)
         self.on_failed(f"{what} is not recorded: {reason}")
+
+    def close(self) -> None:
+        """Close what is still open, as interrupted, once the script has ended."""
+        if os.getpid() == self._process:
+            for each in self._opened:
+                try:
+                    each.close(Status.INTERRUPTED)
+                except Exception as error:  # noqa: BLE001 - the others are closed too
+                    self.failed("the end of a solve", error)
