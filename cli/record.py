@@ -67,11 +67,11 @@ def record(
     stem = target.rpartition(".")[2] if module else Path(target).stem
     adapters = _adapters(adapter)
     _check_folder(folder, stem, force=force)
-    solves = Solves(folder, stem, complain)
+    solves = Solves(folder.absolute(), stem, complain)  # the script may go to another folder
     code = _run(target, args, adapters, solves, module=module)
     recorded = [path for path in solves.files if path.exists()]
     for path in recorded:
-        note(_line(path))
+        note(_line(path, folder / path.name))
     if not recorded and code == 0:
         complain(
             f"{target}: no solve was recorded; brrt record --list names the planners that are "
@@ -208,7 +208,7 @@ def _as_python() -> Iterator[None]:
         sys.stdout, sys.stderr = streams
 
 
-def _line(path: Path) -> str:
+def _line(path: Path, name: Path) -> str:
     """Say what a recording holds."""
     from brrt.errors import BrrtError
     from brrt.formats import read
@@ -218,6 +218,6 @@ def _line(path: Path) -> str:
     except BrrtError as error:
         return str(error)
     if found is None:
-        return f"{path}: is cut; save it with brrt recover"
+        return f"{name}: is cut; save it with brrt recover"
     cost = f", path cost {found['path_cost']:.6g}" if found["solved"] else ""
-    return f"{path}: {counted(found['events'], 'event')}, {found['status']}{cost}"
+    return f"{name}: {counted(found['events'], 'event')}, {found['status']}{cost}"

@@ -274,20 +274,29 @@ def test_a_child_process_is_not_recorded(tmp_path: Path, monkeypatch: pytest.Mon
         solves.open(dof=2, start=[0, 0], goal=[1, 1])
 
 
-def test_curved_motions_are_claimed(folder: Path, brrt: Command) -> None:
-    """Their ends alone are recorded, so verify does not judge what is between them."""
+@pytest.mark.parametrize("curve", ["new.yaw = 0.0", "new.path_y[1:-1] = [9] * len(new.path_y[2:])"])
+def test_curved_motions_are_claimed(curve: str, folder: Path, brrt: Command) -> None:
+    """Their ends alone are recorded, so verify judges neither what is between them nor bounds."""
     (folder / "curves.py").write_text(
         "from planners import *\n"
         "class Curves(RRT):\n"
         "    def steer(self, *given):\n"
         "        new = super().steer(*given)\n"
-        "        new.yaw = 0.0\n"
+        f"        {curve}\n"
         "        return new\n"
-        "Curves([0, 0], [9, 10], OBSTACLES, [-1, 11]).planning()\n"
+        "    def way_back(self, node):\n"
+        "        return True, [1.0, 2.0]\n"
+        "random.seed(1)\n"
+        "Curves([0, 0], [9, 10], [], [-1, 11]).planning()\n"
     )
-    assert brrt("record", "curves.py").code == 0
-    assert read("curves-1.mcap").manifest.claims.motions == "own"
-    assert "the recording claims motions: own" in verify(read("curves-1.mcap")).not_judged
+    done = brrt("record", "curves.py")
+    assert done.code == 0
+    assert "the path of Curves.planning is not recorded: planning returned no points" in done.err
+    recording = read("curves-1.mcap")
+    assert recording.manifest.claims.motions == "own"
+    assert not recording.world.bounded
+    assert "the recording claims motions: own" in verify(recording).not_judged
+    assert verify(recording).holds
 
 
 def test_compiled_scripts_announce_their_classes() -> None:

@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from operator import is_not
 from pathlib import Path
 from typing import Any
@@ -67,8 +68,8 @@ class Solve:
                 return
             rec = self._open(None)
             self._follow(rec)
-            if path is not None and len(path):
-                rec.path(self._from_start(path))
+            if path is not None:
+                self._record_path(rec, path)
             rec.close()
         except Exception as error:  # noqa: BLE001 - the script must go on
             self._fail(error)
@@ -114,9 +115,8 @@ class Solve:
         """Return the recording; open it with what the first motion shows, if there is one."""
         if self._rec is not None:
             return self._rec
-        claims: dict[str, str] = {}
-        if motion is not None and not _is_straight(motion):
-            claims |= {"motions": "own"}
+        straight = motion is None or _is_straight(motion)
+        claims = {} if straight else {"motions": "own"}
         if hasattr(type(self.planner), "rewire"):  # parents are compared now and then
             claims |= {"times": "snapshot"}
         ends = {"start": _place(self.planner.start), "goal": _place(_goal(self.planner))}
@@ -127,7 +127,8 @@ class Solve:
             "claims": claims,
         }
         try:
-            self._rec = self._solves.open(world=_world(self.planner, ends), **about)
+            world = _world(self.planner, ends)
+            self._rec = self._solves.open(world=replace(world, bounded=straight), **about)
         except (BrrtError, AttributeError, TypeError, ValueError) as error:
             self._solves.failed(f"the world of {self._name}", error)
             self._rec = self._solves.open(dof=2, **about)
@@ -167,12 +168,16 @@ class Solve:
         equal = np.flatnonzero((self._q == _place(node)).all(axis=1))
         return int(equal[0]) if len(equal) else -1
 
-    def _from_start(self, path: Any) -> Any:
-        """Return a path in the direction from start to goal; many of them come the other way."""
-        points = np.array([point[:2] for point in path], np.float64)
-        start = np.array(_place(self.planner.start))
-        far = np.hypot(*(points[[0, -1]] - start).T)
-        return points[::-1] if far[1] < far[0] else points
+    def _record_path(self, rec: Recorder, path: Any) -> None:
+        """Record a path from start to goal; many of them come the other way."""
+        try:
+            points = np.array([point[:2] for point in path], np.float64)
+            far = np.hypot(*(points[[0, -1]] - _place(self.planner.start)).T)
+        except (TypeError, ValueError, IndexError):
+            error = BrrtError(f"planning returned no points, but {path!r:.40}")
+            self._solves.failed(f"the path of {self._name}", error)
+        else:
+            rec.path(points[::-1] if far[1] < far[0] else points)
 
 
 def _place(node: Any) -> Place:
@@ -211,7 +216,10 @@ def _is_straight(node: Any) -> bool:
 
 
 def _world(planner: Any, ends: dict[str, Place]) -> World:
-    """Return the circles as obstacles; the robot is a point, and its radius is added to theirs."""
+    """Return the circles as obstacles; the robot is a point, and its radius is added to theirs.
+
+    Samples are drawn within the bounds, so that straight motions stay inside; others may leave.
+    """
     circles = np.array(planner.obstacle_list, np.float64).reshape(-1, 3)
     circles[:, 2] += float(getattr(planner, "robot_radius", 0.0))
     low, high = float(planner.min_rand), float(planner.max_rand)
