@@ -59,6 +59,7 @@ def record(
       brrt record -m planning.demo
     """
     from brrt.recorder.adapters import Solves
+    from brrt.recorder.log import log
 
     if names:
         _print_adapters()
@@ -68,11 +69,13 @@ def record(
     adapters = _adapters(adapter)
     _check_folder(folder, stem, force=force)
     solves = Solves(folder.absolute(), stem, complain)  # the script may go to another folder
+    before = log.recordings
     code = _run(target, args, adapters, solves, module=module)
     recorded = [path for path in solves.files if path.exists()]
     for path in recorded:
         note(_line(path, folder / path.name))
-    if not recorded and code == 0:
+    # A script may also record by itself, by brrt.record.
+    if code == 0 and not recorded and log.recordings == before:
         complain(
             f"{target}: no solve was recorded; brrt record --list names the planners that are "
             "recognized, and brrt.record records any other from its code"

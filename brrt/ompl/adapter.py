@@ -1,22 +1,23 @@
 """The adapter of `brrt record`: an unchanged script that plans with OMPL becomes recordings."""
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 from brrt.errors import BrrtError
+from brrt.recorder.adapters.adapter import Adapter
+from brrt.recorder.adapters.imports import when_imported
+from brrt.recorder.adapters.solves import Solves
 
 
-class OmplAdapter:
+class OmplAdapter(Adapter):
     """OMPL's planners: each SimpleSetup.solve and Planner.solve is a recording."""
 
-    def install(self, solves: Any) -> Callable[[], None]:
+    def install(self, solves: Solves) -> Callable[[], None]:
         """Hook into OMPL once the script has imported it; return what takes the hooks out.
 
         Args:
             solves: Names the files, and takes errors that the script must not notice.
         """
-        when_imported = import_module("brrt.recorder.adapters.imports").when_imported
         hooked: list[tuple[Any, Any]] = []
 
         def hook(module: Any) -> None:
@@ -37,7 +38,7 @@ class OmplAdapter:
         return undo
 
 
-def _recording(original: Callable[..., Any], solves: Any) -> Callable[..., Any]:
+def _recording(original: Callable[..., Any], solves: Solves) -> Callable[..., Any]:
     """Return a `solve` that records."""
 
     def solve(subject: Any, *request: Any, **named: Any) -> Any:

@@ -19,7 +19,13 @@ _open: list[Recorder] = []
 
 
 class Log:
-    """Methods of `Recorder` that do nothing, and return None, while no recording is open."""
+    """Methods of `Recorder` that do nothing, and return None, while no recording is open.
+
+    Attributes:
+        recordings: How many recordings this process has opened.
+    """
+
+    recordings = 0
 
     @property
     def recorder(self) -> Recorder | None:
@@ -86,6 +92,7 @@ log = Log()
 def opened(recorder: Recorder) -> None:
     """Let the log write to a recorder."""
     _open.append(recorder)
+    log.recordings += 1
 
 
 def closed(recorder: Recorder) -> None:

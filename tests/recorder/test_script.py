@@ -218,6 +218,17 @@ def test_what_cannot_be_recorded(args: list[str], why: str, folder: Path, brrt: 
     assert len(done.err.splitlines()) == 1
 
 
+def test_a_script_that_records_by_itself(folder: Path, brrt: Command) -> None:
+    """It needs no adapter."""
+    (folder / "own.py").write_text(
+        "import brrt\n"
+        "with brrt.record('mine.mcap', start=[0, 0], goal=[1, 1]) as rec:\n"
+        "    rec.edge([0, 0])\n"
+    )
+    assert brrt("record", "own.py").code == 0
+    assert brrt("verify", "mine.mcap").code == 0
+
+
 def test_a_script_that_fails_keeps_its_exit_code(folder: Path, brrt: Command) -> None:
     """Also where nothing was recorded."""
     (folder / "seven.py").write_text("raise SystemExit(7)")
