@@ -8,8 +8,8 @@ from brrt.registry import Registry
 
 ADAPTERS: Registry[type[Adapter]] = Registry(
     {
-        "ompl": "brrt.ompl.adapter:OmplAdapter",
         "rrt-classes": "brrt.recorder.adapters.rrt_classes:RRTClasses",
+        "ompl": "brrt.ompl.adapter:OmplAdapter",
     },
     group="brrt.adapters",
     base="brrt.recorder.adapters.adapter:Adapter",
