@@ -194,7 +194,9 @@ def _goal(f: Facts) -> Iterator[Row]:
         texts = []
         if goals.drawn:
             share = goals.failed / max(f.figures["iterations"], 1)
-            part = f" ({share:.0%} of the iterations)" if share >= _SOME else ""
+            # A planner may try the goal from many nodes in each iteration.
+            per = f"{share:.0%} of the iterations" if share <= 1 else f"{share:.3g} an iteration"
+            part = f" ({per})" if share >= _SOME else ""
             times = counted(goals.drawn, "time")
             texts.append(f"sampled {times}, rejected {counted(goals.failed, 'time')}{part}")
         if goals.blocked:

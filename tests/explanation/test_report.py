@@ -12,6 +12,7 @@ from brrt import (
     Scenario,
     World,
     read,
+    record,
     snapshot,
 )
 from brrt.explanation import explain
@@ -83,3 +84,15 @@ def test_places_far_from_the_origin(brrt: Command) -> None:
     assert "388097.25, 3949006.5" in shown
     text = brrt("replay", "run.mcap", "--text").out
     assert "from 388097.25, 3949006.5 to 388115.25, 3949006.5" in text
+
+
+def test_a_goal_that_is_tried_more_often_than_once_an_iteration(tmp_path: Path) -> None:
+    """There is no share of more than 100 %."""
+    with record(tmp_path / "run.mcap", world="circles2d:n=40", planner="mine") as rec:
+        rec.edge([5, 5])
+        for _ in range(20):
+            rec.sample([95, 95], "goal")
+            for _ in range(5):
+                rec.reject([95, 95], 0)
+    told = " ".join(str(explain(read(tmp_path / "run.mcap"))).split())
+    assert "rejected 100 times (5 an iteration)" in told
