@@ -13,9 +13,9 @@ from brrt.events import Reason, Source, Stage
 
 Colour = tuple[int, int, int]
 
-FREE: Colour = (34, 37, 45)
-"""Free space on a dark ground: not black, so that dark obstacles stand out against it."""
-OBSTACLE: Colour = (10, 11, 14)
+FREE: Colour = (18, 20, 26)
+OBSTACLE: Colour = (94, 100, 114)
+"""Lighter than free space by 3:1 at least, in 2D as in 3D; trees and paths are lighter still."""
 OBSTACLE_3D: Colour = (112, 120, 137)
 OUTLINE: Colour = (96, 103, 118)
 START: Colour = (255, 145, 30)
@@ -37,13 +37,13 @@ RING: Colour = (255, 64, 216)
 RUNS: tuple[Colour, Colour] = ((92, 170, 255), (255, 160, 60))
 """Plots of two runs side by side."""
 SAMPLES: Mapping[Source, Colour] = {
-    Source.UNIFORM: (135, 143, 158),
+    Source.UNIFORM: (170, 177, 190),
     Source.GOAL: GOAL,
     Source.OTHER_TREE: (176, 128, 168),
     Source.INFORMED: (94, 158, 160),
 }
 REJECTS: Mapping[Reason, Colour] = {
-    Reason.COLLISION: (150, 74, 80),
+    Reason.COLLISION: (204, 92, 98),
     Reason.NO_PROGRESS: (120, 110, 90),
     Reason.GOAL_BLOCKED: (140, 90, 150),
     Reason.LINK_BLOCKED: (176, 112, 66),
@@ -66,6 +66,7 @@ _PATHS: Mapping[Stage, tuple[Colour, float]] = {
 _HEAT = ((98, 74, 190), (54, 110, 200), (30, 158, 164), (112, 196, 92), (250, 224, 60))
 """From low to high, each bright enough for a dark ground."""
 
+PAPER_OBSTACLE: Colour = (10, 11, 14)
 PAPER_START: Colour = (228, 108, 10)
 PAPER_GOAL: Colour = (24, 150, 62)
 PAPER_PATH: Colour = (216, 164, 0)

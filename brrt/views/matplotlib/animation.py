@@ -15,7 +15,7 @@ from PIL import Image
 from brrt.errors import BrrtError
 from brrt.files import replacing
 from brrt.recording import Recording
-from brrt.views.colours import OBSTACLE, OBSTACLE_3D, rgb
+from brrt.views.colours import OBSTACLE_3D, PAPER_OBSTACLE, rgb
 from brrt.views.matplotlib import style
 from brrt.views.matplotlib.draw_world import need_matplotlib
 from brrt.views.matplotlib.figure import FigureOptions, add_legend, height_of_tree, tree_panel
@@ -198,7 +198,7 @@ def _palette() -> Pixels:
 
     trees = [colour for number in (0, 1, 2) for colour in style.tree_style(number)[1:]]
     others = [style.START, style.GOAL, style.PATH, style.SMOOTHED, style.REJECTED, style.QUIET,
-              style.ROBOT, rgb(OBSTACLE_3D), rgb(OBSTACLE)]  # fmt: skip
+              style.ROBOT, rgb(OBSTACLE_3D), rgb(PAPER_OBSTACLE)]  # fmt: skip
     full = np.array([*trees, *others])[:, None]
     faint = 1 - (1 - full) * np.array([1.0, 0.75, 0.5, 0.25])[:, None]
     heat = colormaps[style.HEAT](np.linspace(0, 1, 48))[:, :3]

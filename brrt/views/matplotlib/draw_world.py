@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from brrt.errors import BrrtError
 from brrt.files import replacing
-from brrt.views.colours import GOAL, OBSTACLE, OBSTACLE_3D, OUTLINE, START, rgb
+from brrt.views.colours import GOAL, OBSTACLE_3D, OUTLINE, PAPER_OBSTACLE, START, rgb
 from brrt.worlds.occupancy import Grid
 from brrt.worlds.world import World
 
@@ -105,7 +105,7 @@ def need_matplotlib() -> Any:
 def _draw_2d(world: World, ax: Any) -> None:
     from matplotlib import collections as artists  # noqa: PLC0415
 
-    dark = rgb(OBSTACLE)
+    dark = rgb(PAPER_OBSTACLE)
     seam: dict[str, Any] = {"linewidths": _SEAM, "joinstyle": "miter"}
     (x0, y0), (x1, y1) = world.lower, world.upper
     if world.grid is not None:
@@ -151,11 +151,11 @@ def _draw_grid(world: World, grid: Grid, ax: Any) -> None:
 
     if not grid.contains_box(world.lower, world.upper):
         (x, y), size = world.lower, world.upper - world.lower
-        ax.add_patch(Rectangle((x, y), *size, color=rgb(OBSTACLE), linewidth=0, zorder=-2))
+        ax.add_patch(Rectangle((x, y), *size, color=rgb(PAPER_OBSTACLE), linewidth=0, zorder=-2))
     turned = Affine2D().rotate(grid.yaw).translate(*grid.origin)
     width, height = grid.size
     ax.imshow(
-        grid.cells, cmap=ListedColormap([(1, 1, 1), rgb(OBSTACLE)]), vmin=0, vmax=1,
+        grid.cells, cmap=ListedColormap([(1, 1, 1), rgb(PAPER_OBSTACLE)]), vmin=0, vmax=1,
         extent=(0, width, 0, height), origin="lower", interpolation="nearest",
         transform=turned + ax.transData, zorder=-1,
     )  # fmt: skip
@@ -177,7 +177,11 @@ def _draw_3d(world: World, ax: Any) -> None:
         edges = np.where(np.arange(len(faces)) < 6 * len(boxes), 0.25, 0.0)
         ax.add_collection3d(
             Poly3DCollection(
-                faces, facecolors=colours, edgecolors=rgb(OBSTACLE), linewidths=edges, zorder=1
+                faces,
+                facecolors=colours,
+                edgecolors=rgb(PAPER_OBSTACLE),
+                linewidths=edges,
+                zorder=1,
             )
         )
     drawn, there = len(boxes) + len(balls), len(world.boxes) + len(world.balls)

@@ -128,6 +128,16 @@ def test_path_shrinks_to_the_smoothed_one(tmp_path: Path) -> None:
     assert np.array_equal(drawn, raw["waypoints"].astype(np.float32))
 
 
+def test_a_path_that_was_walked_is_not_drawn_over_its_trace(tmp_path: Path) -> None:
+    """The raw path of LRTA* is where the robot went, which would flood the picture."""
+    path = tmp_path / "run.rrd"
+    _, log = write(path, Scenario(world="circles2d:n=9", planner="lrta-star", seed=1))
+    assert len(log[Kind.PATH]) == 2
+    assert len(log[Kind.MOVE]) > 0
+    assert len(column(path, "/world/path/smoothed", ":strips")) > 1
+    assert column(path, "/world/path/raw", ":strips") == []
+
+
 def test_text_log(tmp_path: Path) -> None:
     """The text log has phases and paths, in order."""
     path = tmp_path / "run.rrd"

@@ -21,6 +21,9 @@ from brrt.views.rerun.layout import (
     TRACE_ENTITY,
 )
 
+_NEVER = 1 << 62
+"""The number of an event that has not come."""
+
 _LONGEST_SHOWN = 1000
 """Waypoints up to which a path is drawn again after each accepted shortcut."""
 
@@ -43,6 +46,7 @@ class PathsDrawing:
         self._canvas = canvas
         self._path: NDArray[np.float64] | None = None
         self._raw_cost = self._shown_cost = np.inf
+        self._first_move = _NEVER
         for stage in Stage:
             name, colour, radius = path_style(stage)
             canvas.style(f"/world/path/{name}", canvas.lines, colour, -radius, 40.0 + stage)
@@ -52,6 +56,8 @@ class PathsDrawing:
     def write(self, events: Events) -> None:
         """Draw each path, and the path after each accepted shortcut."""
         changes = _changes(events)
+        moves = events[Kind.MOVE]["seq"]
+        self._first_move = min(self._first_move, int(moves[0]) if len(moves) else _NEVER)
         drawn: dict[Stage, list[tuple[Any, NDArray[np.float32]]]] = {}
         for number, (event, stage) in enumerate(changes):
             if stage is not None:
@@ -60,6 +66,8 @@ class PathsDrawing:
                     continue
                 self._canvas.add_text(event, self._text(event, stage))
                 self._draw_ghosts(event)
+                if stage is Stage.RAW and self._first_move < event["seq"]:
+                    continue  # where the robot went while it planned: its trace shows it
             elif self._path is not None:
                 self._path = np.delete(self._path, slice(event["i"] + 1, event["j"]), axis=0)
             if self._path is not None and (stage is not None or len(self._path) <= _LONGEST_SHOWN):
