@@ -43,7 +43,7 @@ SAMPLES: Mapping[Source, Colour] = {
     Source.INFORMED: (94, 158, 160),
 }
 REJECTS: Mapping[Reason, Colour] = {
-    Reason.COLLISION: (204, 92, 98),
+    Reason.COLLISION: (170, 82, 88),
     Reason.NO_PROGRESS: (120, 110, 90),
     Reason.GOAL_BLOCKED: (140, 90, 150),
     Reason.LINK_BLOCKED: (176, 112, 66),
