@@ -286,6 +286,20 @@ class Recorder {
         return writer_->count();
     }
 
+    /// Whether a root is above a node, so that it has a cost-to-come.
+    bool has_cost(int node, int tree = 0) {
+        const auto lock = open();
+        need("node", node, tree);
+        return std::isfinite(nodes(tree).cost(node));
+    }
+
+    /// The distance between two configurations in the robot's metric.
+    double distance(Configuration a, Configuration b) const {
+        need(a);
+        need(b);
+        return distance(a.data(), b.data());
+    }
+
   private:
     using Fields = detail::Fields;
     using Lock = detail::Writer::Lock;
@@ -351,7 +365,6 @@ class Recorder {
         return known_cost(nodes, node) + distance(nodes.place(node), q);
     }
 
-    /// Return the distance in the robot's metric.
     double distance(const double *a, const double *b) const {
         if (options_.robot->distance) return options_.robot->distance(a, b);
         double squares = 0;
