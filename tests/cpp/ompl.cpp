@@ -1,5 +1,6 @@
 // Plans with a planner of OMPL, recorded or not, and prints its graph at the end:
-// ompl PLANNER WORLD ITERATIONS SEED [FILE].
+// ompl PLANNER WORLD ITERATIONS SEED [FILE]. With EXACT in the environment its graph is compared at
+// each iteration, with THROWS the motion check fails in the end.
 #include <brrt/brrt_ompl.hpp>
 
 #include <algorithm>
@@ -12,6 +13,8 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <ompl/base/objectives/PathLengthOptimizationObjective.h>
@@ -50,10 +53,15 @@ std::map<std::string, Place> places() {
     Place circles{{}, 0};
     for (int i = 0; i < 60; ++i)  // none at the ends
         circles.balls.push_back({10 + std::fmod(i * 61.8, 80), 10 + std::fmod(i * 38.3, 80), 2.0 + i % 3});
+    Place many{{}, 0};
+    for (int i = 0; i < 120; ++i)
+        many.balls.push_back({6 + std::fmod(i * 61.8, 88), 6 + std::fmod(i * 38.3, 88), 1.5 + i % 2});
     Place wall{{}, 0};
     for (int i = 0; i <= 40; ++i)
         if (i != 30) wall.balls.push_back({50, i * 2.5, 1.3});
-    return {{"open", {{}, 0}}, {"circles", circles}, {"wall", wall}, {"sparse", {circles.balls, 0.01}}};
+    Place closed = many;
+    for (int i = 0; i <= 40; ++i) closed.balls.push_back({50, i * 2.5, 1.3});
+    return {{"open", {{}, 0}}, {"circles", circles}, {"many", many}, {"closed", closed}, {"wall", wall}, {"sparse", {circles.balls, 0.01}}};
 }
 
 /// Whether a motion of a point touches no ball, exactly.
@@ -73,6 +81,7 @@ const double *position(const ob::State *state) {
 struct Exact : ob::MotionValidator {
     Exact(const ob::SpaceInformationPtr &si, std::vector<Ball> all) : MotionValidator(si), balls(std::move(all)) {}
     bool checkMotion(const ob::State *a, const ob::State *b) const override {
+        if (std::getenv("THROWS") && ++count > 200) throw std::runtime_error("the check failed");
         return is_free(balls, position(a), position(b));
     }
     bool checkMotion(const ob::State *a, const ob::State *b, std::pair<ob::State *, double> &last) const override {
@@ -82,6 +91,7 @@ struct Exact : ob::MotionValidator {
         return false;
     }
     std::vector<Ball> balls;
+    mutable int count = 0;
 };
 
 /// The first two numbers: Debian's OMPL aborts with the default projection.
@@ -172,13 +182,7 @@ double processor_time() {
     return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
 }
 
-}  // namespace
-
-int main(int argc, char **argv) {
-    if (argc < 5) return 2;
-    const std::string name = argv[1], world = argv[2], file = argc > 5 ? argv[5] : "";
-    ompl::msg::setLogLevel(ompl::msg::LOG_WARN);
-    ompl::RNG::setSeed(static_cast<std::uint_fast32_t>(std::atoi(argv[4])));
+void plan(const std::string &name, const std::string &world, long most, const std::string &file) {
     const auto space = space_of(world);
     const bool is_plane = space->getType() == ob::STATE_SPACE_REAL_VECTOR;
     const Place place = places()[is_plane ? world : "circles"];
@@ -213,11 +217,24 @@ int main(int argc, char **argv) {
     }
     setup.setPlanner(planner);
     setup.setup();
-    const long most = std::atol(argv[3]);
     std::atomic<long> asked{0};
     const double began = processor_time();
     setup.solve(ob::PlannerTerminationCondition([&] { return ++asked > most; }));
     const double took = processor_time() - began;
     print_graph(*inner);
     std::printf(", \"seconds\": %.6f, \"asked\": %ld}\n", took, asked.load());
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+    if (argc < 5) return 2;
+    ompl::msg::setLogLevel(ompl::msg::LOG_WARN);
+    ompl::RNG::setSeed(static_cast<std::uint_fast32_t>(std::atoi(argv[4])));
+    try {
+        plan(argv[1], argv[2], std::atol(argv[3]), argc > 5 ? argv[5] : "");
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "%s\n", error.what());
+        return 1;
+    }
 }

@@ -9,6 +9,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 INCLUDE = ROOT / "brrt" / "include"
 
+OMPL = Path("/usr/include/ompl-1.5")
+"""Headers of OMPL, as Debian installs them."""
+
 STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror")
 """How the headers must compile."""
 
@@ -21,3 +24,11 @@ def compiled(source: Path, program: Path, *options: str, compiler: str = "g++") 
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return program
+
+
+def compiled_with_ompl(source: Path, program: Path, *options: str) -> Path:
+    """Compile a program that uses OMPL, or skip the test where OMPL is not installed."""
+    if not OMPL.is_dir():
+        pytest.skip("needs libompl-dev")
+    folders = ("-isystem", str(OMPL), "-isystem", "/usr/include/eigen3")
+    return compiled(source, program, *STRICT, *folders, *options, "-lompl")

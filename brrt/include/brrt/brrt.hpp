@@ -57,11 +57,11 @@ class Recorder {
             auto file = std::make_unique<detail::McapFile>(path, "brrt.hpp");
             file->metadata("brrt.run", detail::manifest(options_, epoch_ns));
             file->attach("world.json", options_.world->to_json(), epoch_ns);
-            file->declare(dof_);
+            const detail::Bytes declarations = file->declare(dof_);
             file->flush();
             if (!options_.on_error)
                 options_.on_error = [](const std::string &why) { std::fprintf(stderr, "brrt: %s\n", why.c_str()); };
-            writer_ = std::make_unique<detail::Writer>(std::move(file), epoch_ns, options_.on_error);
+            writer_ = std::make_unique<detail::Writer>(std::move(file), declarations, epoch_ns, options_.on_error);
         } catch (const std::system_error &error) {
             throw Error(error.what());
         }
@@ -286,11 +286,12 @@ class Recorder {
         return writer_->count();
     }
 
-    /// Whether a root is above a node, so that it has a cost-to-come.
-    bool has_cost(int node, int tree = 0) {
+    /// The cost-to-come of a node; none if no root is above it.
+    Cost cost(int node, int tree = 0) {
         const auto lock = open();
         need("node", node, tree);
-        return std::isfinite(nodes(tree).cost(node));
+        const double found = nodes(tree).cost(node);
+        return std::isfinite(found) ? Cost(found) : Cost();
     }
 
     /// The distance between two configurations in the robot's metric.

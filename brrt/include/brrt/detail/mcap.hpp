@@ -74,6 +74,12 @@ struct Chunk {
     Bytes raw;
     std::array<Bytes, kKindCount> index;  // pairs of a time and a place
     std::uint64_t count = 0, first_ns = 0, last_ns = 0;
+
+    void clear() {
+        raw.clear();
+        for (Bytes &each : index) each.clear();
+        count = first_ns = last_ns = 0;
+    }
 };
 
 /// Return the channel of a kind, and its schema; 0 stands for no schema in MCAP.
@@ -115,73 +121,53 @@ class McapFile {
         body.number(time_ns).number(time_ns).text(name).text("application/json").block(data);
         body.number(crc32(body));
         const auto [at, size] = record(9, body);
-        const std::uint64_t length = data.size();
-        attachment_indexes_.number<std::uint8_t>(10).block(
-            Bytes().number(at).number(size).number(time_ns).number(time_ns).number(length).text(name).text(
-                "application/json"));
+        Bytes entry;
+        entry.number(at).number(size).number(time_ns).number(time_ns).number<std::uint64_t>(data.size());
+        attachment_indexes_.number<std::uint8_t>(10).block(entry.text(name).text("application/json"));
         ++attachment_count_;
     }
 
-    /// Declare the kinds of events, before the first chunk.
-    void declare(std::size_t dof) {
+    /// Declare the kinds of events; return the records that the first chunk begins with.
+    Bytes declare(std::size_t dof) {
         for (std::size_t kind = 0; kind < kKindCount; ++kind) {
             std::string type = kKinds[kind].name, text = kKinds[kind].definition;
             type[0] = static_cast<char>(type[0] - 'a' + 'A');
             for (std::size_t at; (at = text.find('@')) != std::string::npos;)
                 text.replace(at, 1, std::to_string(dof));
-            schemas_.number<std::uint8_t>(3).block(
-                Bytes().number(channel_of(kind)).text("brrt_msgs/msg/" + type).text("ros2msg").text(text));
-            channels_.number<std::uint8_t>(4).block(Bytes()
-                                                        .number(channel_of(kind))
-                                                        .number(channel_of(kind))
-                                                        .text(std::string("/brrt/") + kKinds[kind].name)
-                                                        .text("cdr")
-                                                        .number<std::uint32_t>(0));
+            const std::uint16_t number = channel_of(kind);
+            Bytes schema, channel;
+            schema.number(number).text("brrt_msgs/msg/" + type).text("ros2msg").text(text);
+            channel.number(number).number(number).text(std::string("/brrt/") + kKinds[kind].name);
+            channel.text("cdr").number<std::uint32_t>(0);
+            schemas_.number<std::uint8_t>(3).block(schema);
+            channels_.number<std::uint8_t>(4).block(channel);
         }
-        declarations_.append(schemas_).append(channels_);
+        Bytes declarations = schemas_;
+        declarations.append(channels_);
+        return declarations;
     }
 
     /// Write messages with their indexes, and hand them to the operating system.
-    void chunk(Chunk &chunk) {
-        // The first chunk begins with the schemas and channels.
-        const std::uint64_t shift = declarations_.size();
-        const std::string raw = shift ? declarations_ + chunk.raw : std::string();
-        const std::string_view data = shift ? std::string_view(raw) : std::string_view(chunk.raw);
-        declarations_.clear();
-        const std::uint64_t size = data.size();
-        const auto [at, length] = record(6, Bytes()
-                                                .number(chunk.first_ns)
-                                                .number(chunk.last_ns)
-                                                .number(size)
-                                                .number(crc32(data))
-                                                .text("")
-                                                .block(data));
-        const std::uint64_t indexes_at = position();
+    void chunk(const Chunk &chunk) {
+        const std::uint64_t at = position(), size = chunk.raw.size();
+        Bytes head;
+        head.number(chunk.first_ns).number(chunk.last_ns).number(size).number(crc32(chunk.raw)).text("");
+        pending_.number<std::uint8_t>(6).number<std::uint64_t>(head.size() + 8 + size);
+        pending_.append(head);
+        pending_.block(chunk.raw);
+        const std::uint64_t indexes_at = position(), length = indexes_at - at;
         Bytes places;
         for (std::size_t kind = 0; kind < kKindCount; ++kind) {
-            Bytes &index = chunk.index[kind];
+            const Bytes &index = chunk.index[kind];
             if (index.empty()) continue;
-            for (std::size_t i = 8; shift && i < index.size(); i += 16) {
-                std::uint64_t place;
-                std::memcpy(&place, &index[i], 8);
-                place += shift;
-                std::memcpy(&index[i], &place, 8);
-            }
             counts_[kind] += index.size() / 16;
             places.number(channel_of(kind)).number(position());
             record(7, Bytes().number(channel_of(kind)).text(index));
         }
-        const std::uint64_t indexes_size = position() - indexes_at;
-        chunk_indexes_.number<std::uint8_t>(8).block(Bytes()
-                                                         .number(chunk.first_ns)
-                                                         .number(chunk.last_ns)
-                                                         .number(at)
-                                                         .number(length)
-                                                         .text(places)
-                                                         .number(indexes_size)
-                                                         .text("")
-                                                         .number(size)
-                                                         .number(size));
+        Bytes entry;
+        entry.number(chunk.first_ns).number(chunk.last_ns).number(at).number(length).text(places);
+        entry.number(position() - indexes_at).text("").number(size).number(size);
+        chunk_indexes_.number<std::uint8_t>(8).block(entry);
         if (chunk_count_++ == 0) first_ns_ = chunk.first_ns;
         last_ns_ = chunk.last_ns;
         flush();
@@ -198,16 +184,10 @@ class McapFile {
             if (counts_[kind]) counts.number(channel_of(kind)).number(counts_[kind]);
         }
         const auto kinds = static_cast<std::uint32_t>(kKindCount);
-        statistics.number<std::uint8_t>(11).block(Bytes()
-                                                      .number(messages)
-                                                      .number(static_cast<std::uint16_t>(kinds))
-                                                      .number(kinds)
-                                                      .number(attachment_count_)
-                                                      .number(metadata_count_)
-                                                      .number(chunk_count_)
-                                                      .number(first_ns_)
-                                                      .number(last_ns_)
-                                                      .text(counts));
+        Bytes body;
+        body.number(messages).number(static_cast<std::uint16_t>(kinds)).number(kinds).number(attachment_count_);
+        body.number(metadata_count_).number(chunk_count_).number(first_ns_).number(last_ns_).text(counts);
+        statistics.number<std::uint8_t>(11).block(body);
         const std::pair<std::uint8_t, const Bytes *> groups[] = {
             {std::uint8_t{3}, &schemas_},        {std::uint8_t{4}, &channels_},
             {std::uint8_t{11}, &statistics},     {std::uint8_t{8}, &chunk_indexes_},
@@ -271,7 +251,7 @@ class McapFile {
 
     const std::string path_;
     std::FILE *file_ = nullptr;
-    Bytes pending_, declarations_, schemas_, channels_, chunk_indexes_, attachment_indexes_, metadata_indexes_;
+    Bytes pending_, schemas_, channels_, chunk_indexes_, attachment_indexes_, metadata_indexes_;
     std::uint64_t written_ = 0, first_ns_ = 0, last_ns_ = 0;
     std::array<std::uint64_t, kKindCount> counts_{};
     std::uint32_t crc_ = 0, attachment_count_ = 0, metadata_count_ = 0, chunk_count_ = 0;

@@ -310,7 +310,7 @@ class GraphFollower {
     /// there are several goals; none for the recorder's default.
     Recorder::Cost cost_below(int up, int v) const {
         const Node &parent = nodes_[index(up)];
-        if (rec_.has_cost(parent.number, parent.tree)) return {};
+        if (rec_.cost(parent.number, parent.tree)) return {};
         double cost = rec_.distance(view(place(up)), view(place(v)));
         for (int at = up; nodes_[index(at)].parent >= 0; at = nodes_[index(at)].parent)
             cost += rec_.distance(view(place(nodes_[index(at)].parent)), view(place(at)));
@@ -339,7 +339,10 @@ class GraphFollower {
             if (!connected_.insert(pair(u, v)).second) continue;
             const bool swapped = nodes_[index(u)].tree == 1;
             const Node &a = nodes_[index(swapped ? v : u)], &b = nodes_[index(swapped ? u : v)];
-            if (rec_.has_cost(a.number, 0) && rec_.has_cost(b.number, 1)) rec_.connect(a.number, b.number);
+            const double far = rec_.distance(view(place(swapped ? v : u)), view(place(swapped ? u : v)));
+            // BFMT's nodes may be in both trees, so that others below them have no root in their own.
+            const double ends = rec_.cost(a.number, 0).value_or(0) + rec_.cost(b.number, 1).value_or(0);
+            rec_.connect(a.number, b.number, ends + far);
         }
     }
 

@@ -48,11 +48,11 @@ class Writer {
     using OnError = std::function<void(const std::string &)>;
     using Lock = std::unique_lock<std::mutex>;
 
-    /// Start the thread. `on_error` is called once, from it or from `close`, if the file cannot be
+    /// Start the thread. The first chunk begins with `declarations`. `on_error` is called once, from it or from `close`, if the file cannot be
     /// written any more; what comes then is dropped.
-    Writer(std::unique_ptr<McapFile> file, std::uint64_t epoch_ns, OnError on_error)
+    Writer(std::unique_ptr<McapFile> file, const Bytes &declarations, std::uint64_t epoch_ns, OnError on_error)
         : file_(std::move(file)), epoch_ns_(epoch_ns), on_error_(std::move(on_error)) {
-        chunk_.raw.reserve(kChunkBytes + kChunkBytes / 8);
+        chunk_.raw = declarations;
         thread_ = std::thread([this] { work(); });
     }
     Writer(const Writer &) = delete;
@@ -135,14 +135,10 @@ class Writer {
     std::uint64_t count() const { return sequence_; }  // under a lock
 
   private:
-    static constexpr std::size_t kChunkBytes = 1 << 19, kMostChunks = 16;
+    static constexpr std::size_t kChunkBytes = 1 << 18, kMostChunks = 32;
     static constexpr std::chrono::milliseconds kLate{200};
 
-    Chunk take() {
-        Chunk chunk = std::exchange(chunk_, {});
-        chunk_.raw.reserve(chunk.raw.capacity());
-        return chunk;
-    }
+    Chunk take() { return std::exchange(chunk_, std::exchange(spare_, {})); }
 
     void work() {
         Lock lock(mutex_);
@@ -156,7 +152,9 @@ class Writer {
                 changed_.notify_all();
                 lock.unlock();
                 attempt([&] { file_->chunk(chunk); });
+                chunk.clear();
                 lock.lock();
+                spare_ = std::move(chunk);  // its memory is used again
             }
             writing_ = false;
             changed_.notify_all();
@@ -200,7 +198,7 @@ class Writer {
     const OnError on_error_;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
-    Chunk chunk_;
+    Chunk chunk_, spare_;
     std::deque<Chunk> full_;
     std::uint64_t sequence_ = 0;
     std::string error_;
