@@ -109,16 +109,19 @@ class OmplSession : public Listener {
         const ob::Goal &goal = *pdef->getGoal();
         const auto *state = dynamic_cast<const ob::GoalState *>(&goal);
         const auto *states = dynamic_cast<const ob::GoalStates *>(&goal);
+        bool is_known = false;  // where paths may end
         if (state && state->getState()) {
             options.goal = reals(state->getState());
-        } else if (states && states->hasStates()) {
+            is_known = true;
+        } else if (states && states->getStateCount() > 0) {
             options.goal = reals(states->getState(0));
-            for (unsigned i = 1; i < states->getStateCount(); ++i)
+            is_known = !goal.hasType(ob::GOAL_LAZY_SAMPLES);  // others may be drawn while it plans
+            for (unsigned i = 1; is_known && i < states->getStateCount(); ++i)
                 tolerance = std::max(tolerance, space_.distance(states->getState(0), states->getState(i)));
         } else if (options.goal.empty()) {
-            options.goal = options.start;  // the goal is a region: paths may end anywhere
-            tolerance = space_.getMaximumExtent();
+            options.goal = options.start;  // the goal is a region
         }
+        if (!is_known) tolerance = space_.getMaximumExtent();
         if (const auto *region = dynamic_cast<const ob::GoalRegion *>(&goal))
             if (region->getThreshold() > 1e-9) tolerance += region->getThreshold();
         Claims &claims = options.claims;
