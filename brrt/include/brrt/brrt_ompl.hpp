@@ -4,10 +4,10 @@
 //     setup.setPlanner(brrt::recorded(planner, "run.mcap", options));
 //     setup.solve(1.0);
 //
-// The planner is not changed: the wrapper watches the motions that are checked and the configurations
-// that are drawn, and now and then compares the planner's graph with what it was before. The graph at
-// the end is that of `getPlannerData`. Times are inferred, and claimed to be: an edge is recorded at
-// the time of the check that found it free.
+// The planner is not changed: the wrapper watches the motions that are checked and the
+// configurations that are drawn, and now and then compares the planner's graph with what it was
+// before. The graph at the end is that of `getPlannerData`. Times are inferred, and claimed to be:
+// an edge is recorded at the time of the check that found it free.
 #pragma once
 
 #include <algorithm>
@@ -37,8 +37,8 @@
 
 namespace brrt {
 
-/// What to record of a planner of OMPL. Start, goal, the planner's name and its parameters are those of
-/// the planner unless they are given.
+/// What to record of a planner of OMPL. Start, goal, the planner's name and its parameters are
+/// those of the planner unless they are given.
 struct OmplOptions : Options {
     bool exact = false;   ///< Look at the planner's graph at each iteration; slow.
     bool samples = true;  ///< Record samples, where the space has the usual sampler.
@@ -61,7 +61,8 @@ class OmplSession : public Listener {
     ob::PlannerTerminationCondition condition(const ob::PlannerTerminationCondition &inner) {
         return ob::PlannerTerminationCondition([this, inner] {
             attempt([this] {
-                if (std::this_thread::get_id() != owner_) return;  // PRM asks on a second thread, too
+                if (std::this_thread::get_id() != owner_)
+                    return;  // PRM asks on a second thread, too
                 ++iteration_;
                 if (looks_ && is_due()) look();
             });
@@ -75,7 +76,8 @@ class OmplSession : public Listener {
             look();
             const auto &pdef = planner_.getProblemDefinition();
             if (pdef->hasExactSolution())
-                if (auto *path = dynamic_cast<ompl::geometric::PathGeometric *>(pdef->getSolutionPath().get()))
+                if (auto *path = dynamic_cast<ompl::geometric::PathGeometric *>(
+                        pdef->getSolutionPath().get()))
                     record_path(path->getStates());
         });
         rec_.close();
@@ -84,8 +86,14 @@ class OmplSession : public Listener {
     void checked(const ob::State *from, const ob::State *to, bool is_free) noexcept override {
         attempt([&] {
             const std::vector<double> &a = reals(from);
-            Observation seen{is_free ? Observation::is_free : Observation::blocked, 0, 0, from, to,
-                             hash_of(a.data(), a.size()), 0, 0};
+            Observation seen{is_free ? Observation::is_free : Observation::blocked,
+                             0,
+                             0,
+                             from,
+                             to,
+                             hash_of(a.data(), a.size()),
+                             0,
+                             0};
             if (!is_free) seen.place = keep(a);
             const std::vector<double> &b = reals(to);
             seen.to_hash = hash_of(b.data(), b.size());
@@ -117,7 +125,8 @@ class OmplSession : public Listener {
             options.goal = reals(states->getState(0));
             is_known = !goal.hasType(ob::GOAL_LAZY_SAMPLES);  // others may be drawn while it plans
             for (unsigned i = 1; is_known && i < states->getStateCount(); ++i)
-                tolerance = std::max(tolerance, space_.distance(states->getState(0), states->getState(i)));
+                tolerance =
+                    std::max(tolerance, space_.distance(states->getState(0), states->getState(i)));
         } else if (options.goal.empty()) {
             options.goal = options.start;  // the goal is a region
         }
@@ -129,7 +138,8 @@ class OmplSession : public Listener {
         claims.times = "snapshot";
         claims.samples = "none";
         const std::string &name = planner_.getName();
-        if (name.rfind("Lazy", 0) == 0 || name.rfind("LBK", 0) == 0 || name == "SBL") claims.edges = "assumed";
+        if (name.rfind("Lazy", 0) == 0 || name.rfind("LBK", 0) == 0 || name == "SBL")
+            claims.edges = "assumed";
         if (options.planner == "external") options.planner = "ompl:" + name;
         std::map<std::string, std::string> params;
         planner_.params().getParams(params);
@@ -140,7 +150,8 @@ class OmplSession : public Listener {
 
     /// Time since the beginning in ns, without the time that the recorder took to look at graphs.
     std::int64_t now() const {
-        return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - began_ - paused_).count();
+        return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - began_ - paused_)
+            .count();
     }
 
     /// Return the numbers of a state; they are there until the next call.
@@ -161,11 +172,13 @@ class OmplSession : public Listener {
         seen_.list.push_back(seen);
     }
 
-    /// Whether to look: once the planner did as much as it has nodes, or after a while. So looking takes
-    /// a part of the time that does not grow with the graph.
+    /// Whether to look: once the planner did as much as it has nodes, or after a while. So looking
+    /// takes a part of the time that does not grow with the graph.
     bool is_due() const {
-        if (exact_ || seen_.list.size() > 4 * static_cast<std::size_t>(graph_.nodes()) + 64) return true;
-        return Clock::now() - last_look_ > std::max<Clock::duration>(std::chrono::milliseconds(250), 10 * look_took_);
+        if (exact_ || seen_.list.size() > 4 * static_cast<std::size_t>(graph_.nodes()) + 64)
+            return true;
+        return Clock::now() - last_look_ >
+               std::max<Clock::duration>(std::chrono::milliseconds(250), 10 * look_took_);
     }
 
     void look() {
@@ -173,7 +186,8 @@ class OmplSession : public Listener {
         ob::PlannerData data(planner_.getSpaceInformation());
         planner_.getPlannerData(data);
         moment_ = {now(), iteration_};
-        graph_.follow(data, seen_, [this](const ob::State *state) { return reals(state).data(); }, moment_);
+        graph_.follow(
+            data, seen_, [this](const ob::State *state) { return reals(state).data(); }, moment_);
         record_way();
         moment_.t = -1;
         seen_.list.clear();
@@ -187,7 +201,8 @@ class OmplSession : public Listener {
     void record_way() {
         const std::vector<int> &way = graph_.way_to_goal();
         if (way.empty()) return;
-        if (!planner_.getProblemDefinition()->getGoal()->isSatisfied(graph_.state_of(way.back()))) return;
+        if (!planner_.getProblemDefinition()->getGoal()->isSatisfied(graph_.state_of(way.back())))
+            return;
         std::vector<Point> path;
         for (int node : way) path.emplace_back(graph_.place(node), graph_.place(node) + q_.size());
         record_better(path);
@@ -270,7 +285,9 @@ class Recorded : public ompl::base::Planner {
     }
     void clearQuery() override { inner_->clearQuery(); }
     void checkValidity() override { inner_->checkValidity(); }
-    void getPlannerData(ompl::base::PlannerData &data) const override { inner_->getPlannerData(data); }
+    void getPlannerData(ompl::base::PlannerData &data) const override {
+        inner_->getPlannerData(data);
+    }
 
     using Planner::solve;
     ompl::base::PlannerStatus solve(const ompl::base::PlannerTerminationCondition &ptc) override {
@@ -292,7 +309,9 @@ class Recorded : public ompl::base::Planner {
 
   private:
     struct Listening {
-        Listening(detail::Ear &ear, detail::Listener &listener) : ear_(ear) { ear_.listener = &listener; }
+        Listening(detail::Ear &ear, detail::Listener &listener) : ear_(ear) {
+            ear_.listener = &listener;
+        }
         Listening(const Listening &) = delete;
         Listening &operator=(const Listening &) = delete;
         ~Listening() { ear_.listener = nullptr; }
@@ -313,7 +332,8 @@ class Recorded : public ompl::base::Planner {
 };
 
 /// Wrap a planner so that it is recorded.
-inline ompl::base::PlannerPtr recorded(ompl::base::PlannerPtr planner, std::string path, OmplOptions options = {}) {
+inline ompl::base::PlannerPtr recorded(ompl::base::PlannerPtr planner, std::string path,
+                                       OmplOptions options = {}) {
     return std::make_shared<Recorded>(std::move(planner), std::move(path), std::move(options));
 }
 

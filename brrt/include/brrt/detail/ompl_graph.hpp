@@ -1,4 +1,5 @@
-// From snapshots of a planner's graph to events: what is new, what changed, and when it was checked.
+// From snapshots of a planner's graph to events: what is new, what changed, and when it was
+// checked.
 #pragma once
 
 #include <algorithm>
@@ -35,8 +36,8 @@ inline std::uint64_t motion_key(std::uint64_t a, std::uint64_t b) {
     return (a + b) * 0x9E3779B97F4A7C15u ^ (a ^ b);
 }
 
-/// What a planner did between two snapshots, in order. Configurations of blocked motions (both ends)
-/// and of samples are in `reals`, those of free motions are told apart by hashes.
+/// What a planner did between two snapshots, in order. Configurations of blocked motions (both
+/// ends) and of samples are in `reals`, those of free motions are told apart by hashes.
 struct Observation {
     enum What : std::uint8_t { blocked, is_free, sample } what;
     std::int64_t t, iteration;
@@ -87,9 +88,11 @@ class GraphFollower {
         for (std::size_t i = 0; i < seen.list.size(); ++i) {
             const Observation &event = seen.list[i];
             at = {event.t, event.iteration};
-            if (event.what == Observation::sample) begin(at), rec_.sample(view(&seen.reals[event.place]));
+            if (event.what == Observation::sample)
+                begin(at), rec_.sample(view(&seen.reals[event.place]));
             if (event.what == Observation::blocked) begin(at), reject(event, seen);
-            for (; next < changes_.size() && changes_[next].check == i; ++next) begin(at), make(changes_[next]);
+            for (; next < changes_.size() && changes_[next].check == i; ++next)
+                begin(at), make(changes_[next]);
         }
         at = now;
         begin(at);
@@ -100,8 +103,8 @@ class GraphFollower {
 
     int nodes() const { return static_cast<int>(present_.size()); }
 
-    /// Return the node of the best goal in the last snapshot with the way to it from the start; empty
-    /// if there is none.
+    /// Return the node of the best goal in the last snapshot with the way to it from the start;
+    /// empty if there is none.
     const std::vector<int> &way_to_goal() const { return way_; }
     const double *place(int node) const { return &q_[index(node) * dof_]; }
     const ob::State *state_of(int node) const { return nodes_[index(node)].state; }
@@ -123,7 +126,8 @@ class GraphFollower {
 
     static std::size_t index(int i) { return static_cast<std::size_t>(i); }
     static std::uint64_t pair(int a, int b) {
-        return static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint32_t>(std::max(a, b));
+        return static_cast<std::uint64_t>(std::min(a, b)) << 32 |
+               static_cast<std::uint32_t>(std::max(a, b));
     }
     Configuration view(const double *q) const { return {q, dof_}; }
     void begin(const Moment &at) { rec_.iteration(at.iteration); }
@@ -137,7 +141,8 @@ class GraphFollower {
         present_.clear();
         for (unsigned i = 0; i < count; ++i) {
             const ob::PlannerDataVertex &vertex = data.getVertex(i);
-            node_of[i] = known(vertex.getState(), reals(vertex.getState()), two && vertex.getTag() == 2 ? 1 : 0);
+            node_of[i] = known(vertex.getState(), reals(vertex.getState()),
+                               two && vertex.getTag() == 2 ? 1 : 0);
             if (nodes_[index(node_of[i])].snapshot != snapshot_) present_.push_back(node_of[i]);
             Node &node = nodes_[index(node_of[i])];
             node.snapshot = snapshot_;
@@ -164,7 +169,8 @@ class GraphFollower {
                 connections_.emplace_back(u, v);
                 continue;
             }
-            if (two && nodes_[index(u)].tree == 1) std::swap(u, v);  // OMPL has it from leaf to root
+            if (two && nodes_[index(u)].tree == 1)
+                std::swap(u, v);  // OMPL has it from leaf to root
             Node &child = nodes_[index(v)];
             is_graph = is_graph || u == v || child.target >= 0 || nodes_[index(u)].target == v;
             child.target = u;
@@ -182,7 +188,8 @@ class GraphFollower {
             const int up = reversed ? v : u, down = reversed ? u : v;
             Node &child = nodes_[index(down)];
             const bool is_undirected = directed.count(key(v, u)) > 0;
-            if (is_undirected ? u < v : child.target >= 0 || leads_to(up, down)) links_now_.emplace_back(u, v);
+            if (is_undirected ? u < v : child.target >= 0 || leads_to(up, down))
+                links_now_.emplace_back(u, v);
             else if (!is_undirected) child.target = up;
         }
     }
@@ -233,13 +240,16 @@ class GraphFollower {
             const int goal = node_of[data.getGoalIndex(g)];
             for (int v = goal; v >= 0; v = nodes_[index(v)].target) way_.push_back(v);
             const Node &root = nodes_[index(way_.back())];
-            const bool is_whole = way_.size() > 1 && root.tree == 0 && (root.is_root || root.number == 0);
+            const bool is_whole =
+                way_.size() > 1 && root.tree == 0 && (root.is_root || root.number == 0);
             if (!is_whole) way_.clear();
         }
         std::reverse(way_.begin(), way_.end());
     }
 
-    void change(int node, int other, bool is_link = false) { changes_.push_back({node, other, is_link, kNoCheck}); }
+    void change(int node, int other, bool is_link = false) {
+        changes_.push_back({node, other, is_link, kNoCheck});
+    }
 
     /// Find the last check of each motion that is new, and sort the changes by that.
     void find_checks(const Observations &seen) {
@@ -248,7 +258,8 @@ class GraphFollower {
         for (std::size_t i = 0; i < changes_.size(); ++i) {
             const Change &each = changes_[i];
             if (each.other >= 0)
-                wanted[motion_key(nodes_[index(each.node)].hash, nodes_[index(each.other)].hash)] = i;
+                wanted[motion_key(nodes_[index(each.node)].hash, nodes_[index(each.other)].hash)] =
+                    i;
         }
         for (std::size_t i = 0; i < seen.list.size() && !wanted.empty(); ++i) {
             const Observation &event = seen.list[i];
@@ -306,8 +317,8 @@ class GraphFollower {
         node.parent = node.target;
     }
 
-    /// Return the cost of a node from the node without a parent above it, if that is no root, as where
-    /// there are several goals; none for the recorder's default.
+    /// Return the cost of a node from the node without a parent above it, if that is no root, as
+    /// where there are several goals; none for the recorder's default.
     Recorder::Cost cost_below(int up, int v) const {
         const Node &parent = nodes_[index(up)];
         if (rec_.cost(parent.number, parent.tree)) return {};
@@ -339,9 +350,12 @@ class GraphFollower {
             if (!connected_.insert(pair(u, v)).second) continue;
             const bool swapped = nodes_[index(u)].tree == 1;
             const Node &a = nodes_[index(swapped ? v : u)], &b = nodes_[index(swapped ? u : v)];
-            const double far = rec_.distance(view(place(swapped ? v : u)), view(place(swapped ? u : v)));
-            // BFMT's nodes may be in both trees, so that others below them have no root in their own.
-            const double ends = rec_.cost(a.number, 0).value_or(0) + rec_.cost(b.number, 1).value_or(0);
+            const double far =
+                rec_.distance(view(place(swapped ? v : u)), view(place(swapped ? u : v)));
+            // BFMT's nodes may be in both trees, so that others below them have no root in their
+            // own.
+            const double ends =
+                rec_.cost(a.number, 0).value_or(0) + rec_.cost(b.number, 1).value_or(0);
             rec_.connect(a.number, b.number, ends + far);
         }
     }
@@ -356,7 +370,8 @@ class GraphFollower {
                 continue;
             }
             const Node &a = nodes_[*it >> 32], &b = nodes_[*it & 0xFFFFFFFF];
-            if (a.snapshot == snapshot_ && b.snapshot == snapshot_) rec_.cut(a.number, b.number, a.tree);
+            if (a.snapshot == snapshot_ && b.snapshot == snapshot_)
+                rec_.cut(a.number, b.number, a.tree);
             it = links_.erase(it);
         }
     }
