@@ -85,6 +85,7 @@ def test_every_planner(planner: str, world: str, plan: Plan, tmp_path: Path) -> 
         assert rebuilt(recording) == stated(end)
         assert not verify(recording).findings
         assert recording.manifest.scenario.planner.startswith("ompl:")
+        assert recording.manifest.scenario.seed == seed
         assert recording.result is not None
         assert recording.result["solved"] == end["solved"]
         if planner not in THREADED:
