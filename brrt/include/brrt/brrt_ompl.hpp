@@ -67,6 +67,7 @@ class Recorded : public ompl::base::Planner {
 
     using Planner::solve;
     ompl::base::PlannerStatus solve(const ompl::base::PlannerTerminationCondition &ptc) override {
+        if (!si_->isSetup()) si_->setup();
         std::unique_ptr<detail::OmplSession> session;
         try {
             session = std::make_unique<detail::OmplSession>(*inner_, next_path(), options_,

@@ -129,32 +129,27 @@ inline ob::StateSamplerAllocator watched_sampler(const ob::StateSpace &space, co
     return {};
 }
 
-/// Puts a watched validator and sampler into a space, and puts the old ones back.
+/// Puts a watched validator and sampler into a space, and puts the old ones back. The space stays
+/// set up: setting it up anew would draw random numbers for its projections.
 class Watch {
   public:
     Watch(const ob::SpaceInformationPtr &si, const EarPtr &ear, bool samples)
-        : si_(si), validator_(si->getMotionValidator()), was_setup_(si->isSetup()) {
+        : si_(si), validator_(si->getMotionValidator()) {
         auto &allocator = SamplerAllocator::of(*si->getStateSpace());
-        si->setMotionValidator(std::make_shared<WatchedValidator>(si, validator_, ear));
-        if (was_setup_) si->setup();
-        if (samples && !allocator)
-            allocator = watched_sampler(*si->getStateSpace(), ear), sets_sampler_ = true;
+        si->getMotionValidator() = std::make_shared<WatchedValidator>(si, validator_, ear);
+        sets_sampler_ = samples && !allocator;
+        if (sets_sampler_) allocator = watched_sampler(*si->getStateSpace(), ear);
     }
     Watch(const Watch &) = delete;
     Watch &operator=(const Watch &) = delete;
     ~Watch() {
-        si_->setMotionValidator(validator_);
+        si_->getMotionValidator() = validator_;
         if (sets_sampler_) si_->getStateSpace()->clearStateSamplerAllocator();
-        try {
-            if (was_setup_) si_->setup();
-        } catch (...) {  // it was set up with these parts before
-        }
     }
 
   private:
     const ob::SpaceInformationPtr si_;
     const ob::MotionValidatorPtr validator_;
-    const bool was_setup_;
     bool sets_sampler_ = false;
 };
 
