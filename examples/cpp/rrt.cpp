@@ -34,7 +34,8 @@ int main(int argc, char **argv) {
     const Point start{5, 5}, goal{95, 95};
     brrt::Options options;
     options.world = brrt::World({0, 0}, {size, size}, "circles");
-    for (const auto &[centre, radius] : circles) options.world->ball({centre[0], centre[1]}, radius);
+    for (const auto &[centre, radius] : circles)
+        options.world->ball({centre[0], centre[1]}, radius);
     options.start = {start[0], start[1]};
     options.goal = {goal[0], goal[1]};
     options.planner = "cpp-rrt";
@@ -57,9 +58,11 @@ int main(int argc, char **argv) {
             if (distance(nodes[k], sample) < distance(nodes[nearest], sample)) nearest = k;
         const Point from = nodes[nearest];
         const double far = distance(from, sample), part = far > step ? step / far : 1;
-        const Point to{from[0] + part * (sample[0] - from[0]), from[1] + part * (sample[1] - from[1])};
+        const Point to{from[0] + part * (sample[0] - from[0]),
+                       from[1] + part * (sample[1] - from[1])};
         if (far == 0 || !is_free(from, to)) {
-            rec.reject(sample, nearest, far == 0 ? brrt::Reason::no_progress : brrt::Reason::collision);
+            rec.reject(sample, nearest,
+                       far == 0 ? brrt::Reason::no_progress : brrt::Reason::collision);
             continue;
         }
         nodes.push_back(to);
@@ -67,9 +70,11 @@ int main(int argc, char **argv) {
         const int node = rec.edge(to, nearest);
         if (to == goal) {
             std::vector<std::vector<double>> path;
-            for (int k = node; k >= 0; k = parents[k]) path.insert(path.begin(), {nodes[k][0], nodes[k][1]});
+            for (int k = node; k >= 0; k = parents[k])
+                path.insert(path.begin(), {nodes[k][0], nodes[k][1]});
             rec.path(path);
-            std::cout << "a path of " << path.size() << " waypoints after " << i + 1 << " samples\n";
+            std::cout << "a path of " << path.size() << " waypoints after " << i + 1
+                      << " samples\n";
             return 0;
         }
     }

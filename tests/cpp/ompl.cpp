@@ -1,6 +1,6 @@
 // Plans with a planner of OMPL, recorded or not, and prints its graph at the end:
 // ompl PLANNER WORLD ITERATIONS SEED [FILE]. With EXACT in the environment its graph is compared at
-// each iteration, with THROWS the motion check fails in the end.
+// each iteration, with THROWS the motion check fails in the end, with TWICE it plans once more.
 #include <brrt/brrt_ompl.hpp>
 
 #include <algorithm>
@@ -12,18 +12,18 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <string>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <ompl/base/objectives/PathLengthOptimizationObjective.h>
 #include <ompl/base/spaces/SE2StateSpace.h>
 #include <ompl/geometric/SimpleSetup.h>
-#include <ompl/geometric/planners/informedtrees/BITstar.h>
 #include <ompl/geometric/planners/est/EST.h>
 #include <ompl/geometric/planners/fmt/BFMT.h>
 #include <ompl/geometric/planners/fmt/FMT.h>
+#include <ompl/geometric/planners/informedtrees/BITstar.h>
 #include <ompl/geometric/planners/kpiece/BKPIECE1.h>
 #include <ompl/geometric/planners/kpiece/KPIECE1.h>
 #include <ompl/geometric/planners/kpiece/LBKPIECE1.h>
@@ -52,16 +52,19 @@ struct Place {
 std::map<std::string, Place> places() {
     Place circles{{}, 0};
     for (int i = 0; i < 60; ++i)  // none at the ends
-        circles.balls.push_back({10 + std::fmod(i * 61.8, 80), 10 + std::fmod(i * 38.3, 80), 2.0 + i % 3});
+        circles.balls.push_back(
+            {10 + std::fmod(i * 61.8, 80), 10 + std::fmod(i * 38.3, 80), 2.0 + i % 3});
     Place many{{}, 0};
     for (int i = 0; i < 120; ++i)
-        many.balls.push_back({6 + std::fmod(i * 61.8, 88), 6 + std::fmod(i * 38.3, 88), 1.5 + i % 2});
+        many.balls.push_back(
+            {6 + std::fmod(i * 61.8, 88), 6 + std::fmod(i * 38.3, 88), 1.5 + i % 2});
     Place wall{{}, 0};
     for (int i = 0; i <= 40; ++i)
         if (i != 30) wall.balls.push_back({50, i * 2.5, 1.3});
     Place closed = many;
     for (int i = 0; i <= 40; ++i) closed.balls.push_back({50, i * 2.5, 1.3});
-    return {{"open", {{}, 0}}, {"circles", circles}, {"many", many}, {"closed", closed}, {"wall", wall}, {"sparse", {circles.balls, 0.01}}};
+    return {{"open", {{}, 0}},  {"circles", circles}, {"many", many},
+            {"closed", closed}, {"wall", wall},       {"sparse", {circles.balls, 0.01}}};
 }
 
 /// Whether a motion of a point touches no ball, exactly.
@@ -79,12 +82,14 @@ const double *position(const ob::State *state) {
 }
 
 struct Exact : ob::MotionValidator {
-    Exact(const ob::SpaceInformationPtr &si, std::vector<Ball> all) : MotionValidator(si), balls(std::move(all)) {}
+    Exact(const ob::SpaceInformationPtr &si, std::vector<Ball> all)
+        : MotionValidator(si), balls(std::move(all)) {}
     bool checkMotion(const ob::State *a, const ob::State *b) const override {
         if (std::getenv("THROWS") && ++count > 200) throw std::runtime_error("the check failed");
         return is_free(balls, position(a), position(b));
     }
-    bool checkMotion(const ob::State *a, const ob::State *b, std::pair<ob::State *, double> &last) const override {
+    bool checkMotion(const ob::State *a, const ob::State *b,
+                     std::pair<ob::State *, double> &last) const override {
         if (checkMotion(a, b)) return true;
         last.second = 0;
         if (last.first) si_->copyState(last.first, a);
@@ -113,7 +118,8 @@ Make make() {
     return [](const ob::SpaceInformationPtr &si) {
         auto planner = std::make_shared<Planner>(si);
         if (planner->params().hasParam("range")) planner->params().setParam("range", "4");
-        if constexpr (std::is_same_v<og::KPIECE1, Planner> || std::is_same_v<og::BKPIECE1, Planner> ||
+        if constexpr (std::is_same_v<og::KPIECE1, Planner> ||
+                      std::is_same_v<og::BKPIECE1, Planner> ||
                       std::is_same_v<og::LBKPIECE1, Planner>)
             planner->setProjectionEvaluator(std::make_shared<Plane>(si->getStateSpace()));
         return planner;
@@ -171,9 +177,11 @@ void print_graph(const ob::Planner &planner) {
     for (unsigned i = 0; i < data.numVertices(); ++i) {
         std::vector<unsigned> out;
         data.getEdges(i, out);
-        for (unsigned j : out) std::printf("%s[%u, %u]", std::exchange(first, false) ? "" : ", ", i, j);
+        for (unsigned j : out)
+            std::printf("%s[%u, %u]", std::exchange(first, false) ? "" : ", ", i, j);
     }
-    std::printf("], \"solved\": %s", planner.getProblemDefinition()->hasExactSolution() ? "true" : "false");
+    std::printf("], \"solved\": %s",
+                planner.getProblemDefinition()->hasExactSolution() ? "true" : "false");
 }
 
 double processor_time() {
@@ -194,10 +202,12 @@ void plan(const std::string &name, const std::string &world, long most, const st
         space->copyToReals(q, state);
         return is_free(place.balls, q.data(), q.data());
     });
-    if (is_plane && place.resolution == 0) si->setMotionValidator(std::make_shared<Exact>(si, place.balls));
+    if (is_plane && place.resolution == 0)
+        si->setMotionValidator(std::make_shared<Exact>(si, place.balls));
     if (place.resolution > 0) si->setStateValidityCheckingResolution(place.resolution);
     ob::ScopedState<> start(space), goal(space);
-    for (unsigned k = 0; k < start.reals().size(); ++k) start[k] = k < 2 ? 3 : 1, goal[k] = k < 2 ? 97 : -3;
+    for (unsigned k = 0; k < start.reals().size(); ++k)
+        start[k] = k < 2 ? 3 : 1, goal[k] = k < 2 ? 97 : -3;
     if (world == "arm") start[1] = 2.5, goal[1] = -2.5;
     setup.setStartAndGoalStates(start, goal, world == "sparse" ? 1.0 : 0.001);
     const auto objective = std::make_shared<ob::PathLengthOptimizationObjective>(si);
@@ -220,6 +230,10 @@ void plan(const std::string &name, const std::string &world, long most, const st
     std::atomic<long> asked{0};
     const double began = processor_time();
     setup.solve(ob::PlannerTerminationCondition([&] { return ++asked > most; }));
+    if (std::getenv("TWICE")) {
+        asked = 0;
+        setup.solve(ob::PlannerTerminationCondition([&] { return ++asked > most; }));
+    }
     const double took = processor_time() - began;
     print_graph(*inner);
     std::printf(", \"seconds\": %.6f, \"asked\": %ld}\n", took, asked.load());

@@ -2,7 +2,10 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -10,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from brrt import Recording, read, verify
-from tests.support.compiler import ROOT, compiled_with_ompl
+from brrt import Kind, Recording, read, verify
+from tests.support.compiler import OMPL, ROOT, compiled_with_ompl
 
 pytestmark = pytest.mark.slow  # OMPL's headers take ten seconds to compile
 
@@ -28,9 +31,14 @@ Graph = tuple[Counter[tuple[float, ...]], Counter[frozenset[tuple[float, ...]]]]
 
 
 @pytest.fixture(scope="module")
-def plan(tmp_path_factory: pytest.TempPathFactory) -> Plan:
-    """Compile the program; `plan(planner, world, seed, file)` returns the graph at the end."""
-    program = compiled_with_ompl(SOURCE, tmp_path_factory.mktemp("ompl") / "ompl", "-O1")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Compile the program that plans."""
+    return compiled_with_ompl(SOURCE, tmp_path_factory.mktemp("ompl") / "ompl", "-O1")
+
+
+@pytest.fixture
+def plan(program: Path) -> Plan:
+    """Return `plan(planner, world, seed, file)`, which returns the graph at the end."""
 
     def run(*words: Any, iterations: int = 1500, **environment: str) -> dict[str, Any]:
         name, world, seed, *file = map(str, words)
@@ -77,6 +85,7 @@ def test_every_planner(planner: str, world: str, plan: Plan, tmp_path: Path) -> 
         assert rebuilt(recording) == stated(end)
         assert not verify(recording).findings
         assert recording.manifest.scenario.planner.startswith("ompl:")
+        assert recording.manifest.scenario.seed == seed
         assert recording.result is not None
         assert recording.result["solved"] == end["solved"]
         if planner not in THREADED:
@@ -128,6 +137,29 @@ def test_exception_and_unwritable_file(plan: Plan, tmp_path: Path) -> None:
     assert not verify(recording).findings
 
 
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar", "BITstar", "PRM"])
+def test_second_solve(planner: str, plan: Plan, tmp_path: Path) -> None:
+    """It continues with the graph of the first one, in a file of its own."""
+    pytest.importorskip("networkx")
+    end = plan(planner, "circles", 1, tmp_path / "run.mcap", TWICE="1")
+    assert rebuilt(read(tmp_path / "run-2.mcap")) == stated(end)
+    for path in tmp_path.glob("*.mcap"):
+        assert not verify(read(path)).findings
+
+
+def test_killed_process(program: Path, tmp_path: Path) -> None:
+    """What was compared before can be read."""
+    path = tmp_path / "run.mcap"
+    with subprocess.Popen([program, "RRTstar", "circles", "1000000000", "1", path]) as process:
+        time.sleep(3)
+        process.kill()
+    recording = read(path, partial=True)
+    log = recording.events()
+    assert len(log[Kind.EDGE]) > 1000
+    assert log.last.t > 5e8
+    assert not verify(recording).findings
+
+
 @pytest.mark.parametrize("sanitizer", ["address,undefined", "thread"])
 def test_sanitizers(sanitizer: str, tmp_path: Path) -> None:
     """No sanitizer reports anything."""
@@ -140,9 +172,18 @@ def test_sanitizers(sanitizer: str, tmp_path: Path) -> None:
         assert "Sanitizer" not in done.stderr, done.stderr
 
 
+def test_function_of_the_page(tmp_path: Path) -> None:
+    """What docs/cpp.md shows of OMPL compiles."""
+    blocks = re.findall(r"```cpp\n(.*?)```", (ROOT / "docs" / "cpp.md").read_text(), re.DOTALL)
+    source = tmp_path / "plan.cpp"
+    source.write_text(f"#include <ompl/geometric/SimpleSetup.h>\n{blocks[1]}")
+    compiled_with_ompl(source, Path(os.devnull), "-fsyntax-only")
+
+
 def test_example_by_cmake(tmp_path: Path) -> None:
     """`find_package(brrt)` finds OMPL, too; the example plans, and its file can be read."""
-    compiled_with_ompl(SOURCE, Path(os.devnull), "-fsyntax-only")
+    if not OMPL.is_dir() or shutil.which("cmake") is None:
+        pytest.skip("needs libompl-dev and cmake")
     build, folder = tmp_path / "build", ROOT / "examples" / "cpp"
     package = f"-Dbrrt_DIR={ROOT / 'brrt' / 'cmake'}"
     commands: list[list[str | Path]] = [

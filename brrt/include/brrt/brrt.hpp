@@ -36,11 +36,11 @@ namespace brrt {
 
 /// Takes the events of a planner, from any thread, and writes them on a thread of its own.
 ///
-/// Nodes of a tree are numbered 0, 1, 2 ...; tree 0 grows from the start, tree 1 from the goal. Costs
-/// are lengths in the robot's metric, unless they are given; an iteration is a sample, unless it is
-/// set. A value that no event can have throws `Error`, and so does a file that cannot be opened. A
-/// file that cannot be written later, as on a full disk, is reported once and never disturbs the
-/// planner: see `error`. A process that is killed leaves all but its last half second.
+/// Nodes of a tree are numbered 0, 1, 2 ...; tree 0 grows from the start, tree 1 from the goal.
+/// Costs are lengths in the robot's metric, unless they are given; an iteration is a sample, unless
+/// it is set. A value that no event can have throws `Error`, and so does a file that cannot be
+/// opened. A file that cannot be written later, as on a full disk, is reported once and never
+/// disturbs the planner: see `error`. A process that is killed leaves all but its last half second.
 class Recorder {
   public:
     using Cost = std::optional<double>;
@@ -51,8 +51,8 @@ class Recorder {
             throw Error(path + ": name a file that ends in .mcap");
         detail::resolve(options_);
         const auto now = std::chrono::system_clock::now().time_since_epoch();
-        const auto epoch_ns =
-            static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+        const auto epoch_ns = static_cast<std::uint64_t>(
+            std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
         try {
             auto file = std::make_unique<detail::McapFile>(path, "brrt.hpp");
             file->metadata("brrt.run", detail::manifest(options_, epoch_ns));
@@ -60,8 +60,11 @@ class Recorder {
             const detail::Bytes declarations = file->declare(dof_);
             file->flush();
             if (!options_.on_error)
-                options_.on_error = [](const std::string &why) { std::fprintf(stderr, "brrt: %s\n", why.c_str()); };
-            writer_ = std::make_unique<detail::Writer>(std::move(file), declarations, epoch_ns, options_.on_error);
+                options_.on_error = [](const std::string &why) {
+                    std::fprintf(stderr, "brrt: %s\n", why.c_str());
+                };
+            writer_ = std::make_unique<detail::Writer>(std::move(file), declarations, epoch_ns,
+                                                       options_.on_error);
         } catch (const std::system_error &error) {
             throw Error(error.what());
         }
@@ -85,7 +88,8 @@ class Recorder {
     void iteration(std::int64_t value) {
         const auto lock = open();
         if (value < iteration_ || value >= std::int64_t{1} << 60)
-            throw Error("iteration must be a whole number from " + std::to_string(iteration_) + " on");
+            throw Error("iteration must be a whole number from " + std::to_string(iteration_) +
+                        " on");
         iteration_ = value;
         counts_samples_ = false;
     }
@@ -109,7 +113,9 @@ class Recorder {
         auto &tree_nodes = nodes(tree);
         const int number = tree_nodes.count();
         if (parent != -1) need("parent", parent, tree);
-        const double total = cost ? possible(*cost) : parent < 0 ? 0 : via(tree_nodes, parent, q.data());
+        const double total = cost         ? possible(*cost)
+                             : parent < 0 ? 0
+                                          : via(tree_nodes, parent, q.data());
         put(Kind::edge, [&](Fields &f) {
             f.add(byte(tree)).add(number).add(parent).add(total).array(q.data(), dof_);
         });
@@ -122,9 +128,13 @@ class Recorder {
         need(q);
         const auto lock = open();
         const auto &tree_nodes = nodes(tree);
-        const bool is_node = node < tree_nodes.count() ? tree_nodes.has(node) : node == 0 || node < cells_;
-        if (node < 0 || !is_node) throw Error("node must be a node of the tree or an expanded cell, not " + std::to_string(node));
-        put(Kind::reject, [&](Fields &f) { f.add(byte(tree)).add(node).add(reason).array(q.data(), dof_); });
+        const bool is_node =
+            node < tree_nodes.count() ? tree_nodes.has(node) : node == 0 || node < cells_;
+        if (node < 0 || !is_node)
+            throw Error("node must be a node of the tree or an expanded cell, not " +
+                        std::to_string(node));
+        put(Kind::reject,
+            [&](Fields &f) { f.add(byte(tree)).add(node).add(reason).array(q.data(), dof_); });
     }
 
     /// Record that a node got another parent; the costs of its descendants follow.
@@ -137,7 +147,8 @@ class Recorder {
         need("parent", parent, tree);
         if (tree_nodes.descends(parent, node))
             throw Error("parent of node " + std::to_string(node) + " must not descend from it");
-        const double total = cost ? possible(*cost) : via(tree_nodes, parent, tree_nodes.place(node));
+        const double total =
+            cost ? possible(*cost) : via(tree_nodes, parent, tree_nodes.place(node));
         put(Kind::rewire, [&](Fields &f) { f.add(byte(tree)).add(node).add(parent).add(total); });
         tree_nodes.move(node, parent, total);
     }
@@ -150,7 +161,8 @@ class Recorder {
         need("node", node, 0);
         need("other", other, 1);
         const double total =
-            cost ? possible(*cost) : via(trees_[0], node, trees_[1].place(other)) + known_cost(trees_[1], other);
+            cost ? possible(*cost)
+                 : via(trees_[0], node, trees_[1].place(other)) + known_cost(trees_[1], other);
         put(Kind::connect, [&](Fields &f) { f.add(node).add(other).add(total); });
     }
 
@@ -158,7 +170,8 @@ class Recorder {
     ///
     /// @param cost Its cost; by default its length in the robot's metric.
     /// @param stage By default the first path is raw and those after it are improved.
-    void path(const std::vector<Point> &waypoints, Cost cost = {}, std::optional<Stage> stage = {}) {
+    void path(const std::vector<Point> &waypoints, Cost cost = {},
+              std::optional<Stage> stage = {}) {
         std::vector<double> flat;
         for (const Point &q : waypoints) {
             need(q, "waypoints");
@@ -166,13 +179,20 @@ class Recorder {
         }
         if (flat.empty()) throw Error("waypoints must be one configuration at least");
         double total = 0;
-        for (std::size_t i = dof_; i < flat.size(); i += dof_) total += distance(&flat[i - dof_], &flat[i]);
+        for (std::size_t i = dof_; i < flat.size(); i += dof_)
+            total += distance(&flat[i - dof_], &flat[i]);
         if (cost) total = possible(*cost);
         const auto lock = open();
         const Stage kept = stage.value_or(metrics_.solved() ? Stage::improved : Stage::raw);
-        put(Kind::path, [&](Fields &f) {
-            f.add(kept).add(total).add(static_cast<std::uint32_t>(flat.size())).array(flat.data(), flat.size());
-        }, flat.size());
+        put(
+            Kind::path,
+            [&](Fields &f) {
+                f.add(kept)
+                    .add(total)
+                    .add(static_cast<std::uint32_t>(flat.size()))
+                    .array(flat.data(), flat.size());
+            },
+            flat.size());
         metrics_.path(kept, total, std::move(flat), last_t_, iteration_);
     }
 
@@ -185,12 +205,13 @@ class Recorder {
         const auto lock = open();
         if (cell < 0 || parent < -1) throw Error("cell and parent must be numbers of cells");
         const double total = possible(cost);
-        put(Kind::expand, [&](Fields &f) { f.add(cell).add(parent).add(total).array(q.data(), dof_); });
+        put(Kind::expand,
+            [&](Fields &f) { f.add(cell).add(parent).add(total).array(q.data(), dof_); });
         cells_ = std::max(cells_, cell + 1);
     }
 
-    /// Record that a node joined without an edge, and return its number; it has no cost until `rewire`
-    /// gives it a parent.
+    /// Record that a node joined without an edge, and return its number; it has no cost until
+    /// `rewire` gives it a parent.
     int vertex(Configuration q, int tree = 0) {
         need(q);
         const auto lock = open();
@@ -209,8 +230,10 @@ class Recorder {
         auto &tree_nodes = nodes(tree);
         need("node", node, tree);
         need("other", other, tree);
-        if (node == other) throw Error("other must not be the node itself, " + std::to_string(node));
-        const double total = cost ? possible(*cost) : distance(tree_nodes.place(node), tree_nodes.place(other));
+        if (node == other)
+            throw Error("other must not be the node itself, " + std::to_string(node));
+        const double total =
+            cost ? possible(*cost) : distance(tree_nodes.place(node), tree_nodes.place(other));
         put(Kind::link, [&](Fields &f) { f.add(byte(tree)).add(node).add(other).add(total); });
         tree_nodes.link(node, other);
     }
@@ -225,7 +248,8 @@ class Recorder {
         const int end = other == -1 ? tree_nodes.parent(node) : other;
         need("other", end, tree);
         if (!tree_nodes.has_edge(node, end))
-            throw Error("other must be joined to node " + std::to_string(node) + ", not " + std::to_string(end));
+            throw Error("other must be joined to node " + std::to_string(node) + ", not " +
+                        std::to_string(end));
         put(Kind::cut, [&](Fields &f) { f.add(byte(tree)).add(node).add(end); });
         tree_nodes.cut(node, end);
     }
@@ -252,7 +276,8 @@ class Recorder {
         if (other != -1) need("other", other, tree);
         else if (!q.size()) throw Error("q must be given for a motion that ends at no node");
         const double *end = q.size() ? q.data() : nodes(tree).place(other);
-        put(Kind::check, [&](Fields &f) { f.add(byte(tree)).add(node).add(other).add(part).array(end, dof_); });
+        put(Kind::check,
+            [&](Fields &f) { f.add(byte(tree)).add(node).add(other).add(part).array(end, dof_); });
     }
 
     /// Wait until the events so far are handed to the operating system.
@@ -277,7 +302,8 @@ class Recorder {
         writer_->close(result);
     }
 
-    /// Why the file cannot be written any more; empty if it can. What was written before can be read.
+    /// Why the file cannot be written any more; empty if it can. What was written before can be
+    /// read.
     std::string error() const { return writer_->error(); }
 
     /// Number of events so far.
@@ -322,7 +348,8 @@ class Recorder {
             options_.clock ? options_.clock()
                            : std::chrono::duration_cast<std::chrono::nanoseconds>(measured).count();
         last_t_ = std::max(t, last_t_ + 1);
-        writer_->put(kind, last_t_, iteration_, 64 + 8 * (dof_ + numbers), std::forward<Fill>(fill));
+        writer_->put(kind, last_t_, iteration_, 64 + 8 * (dof_ + numbers),
+                     std::forward<Fill>(fill));
         metrics_.count(kind);
     }
 
@@ -345,8 +372,8 @@ class Recorder {
     /// Throw unless a node exists.
     void need(const char *name, int node, int tree) {
         if (!nodes(tree).has(node))
-            throw Error(std::string(name) + " must be a node of tree " + std::to_string(tree) + ", not " +
-                        std::to_string(node));
+            throw Error(std::string(name) + " must be a node of tree " + std::to_string(tree) +
+                        ", not " + std::to_string(node));
     }
 
     static double possible(double cost) {

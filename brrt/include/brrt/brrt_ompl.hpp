@@ -4,238 +4,32 @@
 //     setup.setPlanner(brrt::recorded(planner, "run.mcap", options));
 //     setup.solve(1.0);
 //
-// The planner is not changed: the wrapper watches the motions that are checked and the configurations
-// that are drawn, and now and then compares the planner's graph with what it was before. The graph at
-// the end is that of `getPlannerData`. Times are inferred, and claimed to be: an edge is recorded at
-// the time of the check that found it free.
+// The planner is not changed: the wrapper watches the motions that are checked and the
+// configurations that are drawn, and now and then compares the planner's graph with what it was
+// before. The graph at the end is that of `getPlannerData`. Times are inferred, and claimed to be:
+// an edge is recorded at the time of the check that found it free.
 #pragma once
 
-#include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <cstdint>
 #include <exception>
-#include <limits>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <string>
-#include <thread>
 #include <utility>
-#include <vector>
 
 #include <ompl/base/Planner.h>
-#include <ompl/base/PlannerData.h>
-#include <ompl/base/goals/GoalState.h>
-#include <ompl/base/goals/GoalStates.h>
-#include <ompl/geometric/PathGeometric.h>
 #include <ompl/util/Console.h>
 
 #include "brrt.hpp"
-#include "detail/ompl_graph.hpp"
+#include "detail/ompl_session.hpp"
 #include "detail/ompl_watch.hpp"
 
 namespace brrt {
 
-/// What to record of a planner of OMPL. Start, goal, the planner's name and its parameters are those of
-/// the planner unless they are given.
+/// What to record of a planner of OMPL. Start, goal, the planner's name and its parameters are
+/// those of the planner unless they are given.
 struct OmplOptions : Options {
     bool exact = false;   ///< Look at the planner's graph at each iteration; slow.
     bool samples = true;  ///< Record samples, where the space has the usual sampler.
 };
-
-namespace detail {
-
-/// One call of a planner's `solve`, as it is recorded.
-class OmplSession : public Listener {
-  public:
-    OmplSession(ob::Planner &planner, const std::string &path, OmplOptions options)
-        : planner_(planner),
-          space_(*planner.getSpaceInformation()->getStateSpace()),
-          exact_(options.exact),
-          looks_(!planner.getSpecs().multithreaded),
-          rec_(path, complete(std::move(options))),
-          graph_(rec_, q_.size(), reals(planner.getProblemDefinition()->getStartState(0))) {}
-
-    /// Return a condition that looks at the planner's graph when it is asked.
-    ob::PlannerTerminationCondition condition(const ob::PlannerTerminationCondition &inner) {
-        return ob::PlannerTerminationCondition([this, inner] {
-            attempt([this] {
-                if (std::this_thread::get_id() != owner_) return;  // PRM asks on a second thread, too
-                ++iteration_;
-                if (looks_ && is_due()) look();
-            });
-            return inner();
-        });
-    }
-
-    /// Record the rest. The planner may have stopped for any reason.
-    void finish() {
-        attempt([this] {
-            look();
-            const auto &pdef = planner_.getProblemDefinition();
-            if (pdef->hasExactSolution())
-                if (auto *path = dynamic_cast<ompl::geometric::PathGeometric *>(pdef->getSolutionPath().get()))
-                    record_path(path->getStates());
-        });
-        rec_.close();
-    }
-
-    void checked(const ob::State *from, const ob::State *to, bool is_free) noexcept override {
-        attempt([&] {
-            const std::vector<double> &a = reals(from);
-            Observation seen{is_free ? Observation::is_free : Observation::blocked, 0, 0, from, to,
-                             hash_of(a.data(), a.size()), 0, 0};
-            if (!is_free) seen.place = keep(a);
-            const std::vector<double> &b = reals(to);
-            seen.to_hash = hash_of(b.data(), b.size());
-            if (!is_free) keep(b);
-            add(seen);
-        });
-    }
-    void sampled(const ob::State *state) noexcept override {
-        attempt([&] { add({Observation::sample, 0, 0, state, state, 0, 0, keep(reals(state))}); });
-    }
-
-  private:
-    using Clock = std::chrono::steady_clock;
-
-    /// Fill in what the planner knows.
-    Options complete(OmplOptions options) {
-        const auto &pdef = planner_.getProblemDefinition();
-        if (pdef->getStartStateCount() == 0) throw Error("the problem has no start state");
-        options.start = reals(pdef->getStartState(0));
-        double tolerance = 0;
-        const ob::Goal &goal = *pdef->getGoal();
-        const auto *state = dynamic_cast<const ob::GoalState *>(&goal);
-        const auto *states = dynamic_cast<const ob::GoalStates *>(&goal);
-        if (state && state->getState()) {
-            options.goal = reals(state->getState());
-        } else if (states && states->hasStates()) {
-            options.goal = reals(states->getState(0));
-            for (unsigned i = 1; i < states->getStateCount(); ++i)
-                tolerance = std::max(tolerance, space_.distance(states->getState(0), states->getState(i)));
-        } else if (options.goal.empty()) {
-            options.goal = options.start;  // the goal is a region: paths may end anywhere
-            tolerance = space_.getMaximumExtent();
-        }
-        if (const auto *region = dynamic_cast<const ob::GoalRegion *>(&goal))
-            if (region->getThreshold() > 1e-9) tolerance += region->getThreshold();
-        Claims &claims = options.claims;
-        claims.goal_tolerance = std::max(claims.goal_tolerance, tolerance);
-        claims.times = "snapshot";
-        claims.samples = "none";
-        const std::string &name = planner_.getName();
-        if (name.rfind("Lazy", 0) == 0 || name.rfind("LBK", 0) == 0 || name == "SBL") claims.edges = "assumed";
-        if (options.planner == "external") options.planner = "ompl:" + name;
-        std::map<std::string, std::string> params;
-        planner_.params().getParams(params);
-        for (const auto &[key, value] : params) options.params.emplace(key, value);
-        options.clock = [this] { return moment_.t >= 0 ? moment_.t : now(); };
-        return options;
-    }
-
-    /// Time since the beginning in ns, without the time that the recorder took to look at graphs.
-    std::int64_t now() const {
-        return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - began_ - paused_).count();
-    }
-
-    /// Return the numbers of a state; they are there until the next call.
-    const std::vector<double> &reals(const ob::State *state) {
-        space_.copyToReals(q_, state);
-        return q_;
-    }
-
-    std::size_t keep(const std::vector<double> &q) {
-        const std::size_t place = seen_.reals.size();
-        seen_.reals.insert(seen_.reals.end(), q.begin(), q.end());
-        return place;
-    }
-
-    void add(Observation seen) {
-        seen.t = now();
-        seen.iteration = iteration_;
-        seen_.list.push_back(seen);
-    }
-
-    /// Whether to look: once the planner did as much as it has nodes, or after a while. So looking takes
-    /// a part of the time that does not grow with the graph.
-    bool is_due() const {
-        if (exact_ || seen_.list.size() > 4 * static_cast<std::size_t>(graph_.nodes()) + 64) return true;
-        return Clock::now() - last_look_ > std::max<Clock::duration>(std::chrono::milliseconds(250), 10 * look_took_);
-    }
-
-    void look() {
-        const auto begin = Clock::now();
-        ob::PlannerData data(planner_.getSpaceInformation());
-        planner_.getPlannerData(data);
-        moment_ = {now(), iteration_};
-        graph_.follow(data, seen_, [this](const ob::State *state) { return reals(state).data(); }, moment_);
-        record_way();
-        moment_.t = -1;
-        seen_.list.clear();
-        seen_.reals.clear();
-        last_look_ = Clock::now();
-        look_took_ = last_look_ - begin;
-        paused_ += look_took_;
-    }
-
-    /// Record the way to the best goal so far, if it is better than the last path.
-    void record_way() {
-        const std::vector<int> &way = graph_.way_to_goal();
-        if (way.empty()) return;
-        if (!planner_.getProblemDefinition()->getGoal()->isSatisfied(graph_.state_of(way.back()))) return;
-        std::vector<Point> path;
-        for (int node : way) path.emplace_back(graph_.place(node), graph_.place(node) + q_.size());
-        record_better(path);
-    }
-
-    void record_path(const std::vector<ob::State *> &states) {
-        std::vector<Point> path;
-        for (const ob::State *state : states) path.push_back(reals(state));
-        record_better(path);
-    }
-
-    void record_better(const std::vector<Point> &path) {
-        double length = 0;
-        for (std::size_t i = 1; i < path.size(); ++i) length += rec_.distance(path[i - 1], path[i]);
-        if (length < best_ * (1 - 1e-12)) {
-            rec_.path(path);
-            best_ = length;
-        }
-    }
-
-    /// Do something for the record, alone, and give up the record rather than disturb the planner.
-    template <class Work>
-    void attempt(Work &&work) noexcept {
-        try {
-            const std::lock_guard<std::recursive_mutex> lock(mutex_);
-            if (!failed_) work();
-        } catch (const std::exception &error) {
-            failed_ = true;
-            OMPL_ERROR("brrt: the rest is not recorded: %s", error.what());
-        }
-    }
-
-    ob::Planner &planner_;
-    const ob::StateSpace &space_;
-    const bool exact_, looks_;
-    const std::thread::id owner_ = std::this_thread::get_id();
-    const Clock::time_point began_ = Clock::now();
-    Clock::time_point last_look_ = began_;
-    Clock::duration paused_{}, look_took_{};
-    std::vector<double> q_;
-    Moment moment_;
-    std::int64_t iteration_ = 0;
-    double best_ = std::numeric_limits<double>::infinity();
-    Observations seen_;
-    Recorder rec_;
-    GraphFollower graph_;
-    std::recursive_mutex mutex_;  // a goal may check motions when it is asked
-    std::atomic<bool> failed_{false};
-};
-
-}  // namespace detail
 
 /// A planner whose calls of `solve` are recorded; everything else is the inner planner's.
 ///
@@ -267,13 +61,17 @@ class Recorded : public ompl::base::Planner {
     }
     void clearQuery() override { inner_->clearQuery(); }
     void checkValidity() override { inner_->checkValidity(); }
-    void getPlannerData(ompl::base::PlannerData &data) const override { inner_->getPlannerData(data); }
+    void getPlannerData(ompl::base::PlannerData &data) const override {
+        inner_->getPlannerData(data);
+    }
 
     using Planner::solve;
     ompl::base::PlannerStatus solve(const ompl::base::PlannerTerminationCondition &ptc) override {
+        if (!si_->isSetup()) si_->setup();
         std::unique_ptr<detail::OmplSession> session;
         try {
-            session = std::make_unique<detail::OmplSession>(*inner_, next_path(), options_);
+            session = std::make_unique<detail::OmplSession>(*inner_, next_path(), options_,
+                                                            options_.exact);
         } catch (const std::exception &error) {
             OMPL_ERROR("brrt: this solve is not recorded: %s", error.what());
             return inner_->solve(ptc);
@@ -289,7 +87,9 @@ class Recorded : public ompl::base::Planner {
 
   private:
     struct Listening {
-        Listening(detail::Ear &ear, detail::Listener &listener) : ear_(ear) { ear_.listener = &listener; }
+        Listening(detail::Ear &ear, detail::Listener &listener) : ear_(ear) {
+            ear_.listener = &listener;
+        }
         Listening(const Listening &) = delete;
         Listening &operator=(const Listening &) = delete;
         ~Listening() { ear_.listener = nullptr; }
@@ -310,7 +110,8 @@ class Recorded : public ompl::base::Planner {
 };
 
 /// Wrap a planner so that it is recorded.
-inline ompl::base::PlannerPtr recorded(ompl::base::PlannerPtr planner, std::string path, OmplOptions options = {}) {
+inline ompl::base::PlannerPtr recorded(ompl::base::PlannerPtr planner, std::string path,
+                                       OmplOptions options = {}) {
     return std::make_shared<Recorded>(std::move(planner), std::move(path), std::move(options));
 }
 

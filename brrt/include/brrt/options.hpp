@@ -19,10 +19,10 @@ namespace brrt {
 struct Claims {
     std::string motions = "straight";  ///< "own": arcs, dynamics and the like.
     std::string costs = "length";      ///< "own": anything but the lengths of motions.
-    std::string edges = "checked";     ///< "assumed": they are not checked before they are recorded.
-    std::string times = "exact";       ///< "snapshot": inferred from states of the planner.
-    std::string samples = "all";       ///< "none": not all of them are recorded.
-    double goal_tolerance = 0;         ///< Distance from the goal within which paths may end.
+    std::string edges = "checked";  ///< "assumed": they are not checked before they are recorded.
+    std::string times = "exact";    ///< "snapshot": inferred from states of the planner.
+    std::string samples = "all";    ///< "none": not all of them are recorded.
+    double goal_tolerance = 0;      ///< Distance from the goal within which paths may end.
 };
 
 /// The value of a planner's parameter, for readers.
@@ -45,11 +45,11 @@ struct Options {
     Point start, goal;           ///< First and last configuration.
     std::optional<Robot> robot;  ///< A point where a configuration is a position, and else opaque.
     std::string planner = "external";
-    std::map<std::string, Param> params;      ///< The planner's parameters, for readers.
-    std::uint64_t seed = 0;                   ///< Of its random draws, for readers.
-    std::optional<std::int64_t> iterations;   ///< Its limit of iterations, for readers.
-    std::optional<double> time_limit;         ///< Its limit of time in s, for readers.
-    std::string contract;                     ///< What it promises, JSON as docs/python.md lists it; or "".
+    std::map<std::string, Param> params;     ///< The planner's parameters, for readers.
+    std::uint64_t seed = 0;                  ///< Of its random draws, for readers.
+    std::optional<std::int64_t> iterations;  ///< Its limit of iterations, for readers.
+    std::optional<double> time_limit;        ///< Its limit of time in s, for readers.
+    std::string contract;  ///< What it promises, JSON as docs/python.md lists it; or "".
     Claims claims;
     /// Returns the time of the next event in ns since the run began; none to measure it.
     std::function<std::int64_t()> clock;
@@ -60,7 +60,8 @@ struct Options {
 namespace detail {
 
 /// Throw unless a claim is one of two; return it for the manifest if it is not the usual one.
-inline std::string claim(const char *name, const std::string &value, const char *usual, const char *other) {
+inline std::string claim(const char *name, const std::string &value, const char *usual,
+                         const char *other) {
     if (value == usual) return "";
     if (value != other)
         throw Error(std::string(name) + " must be " + usual + " or " + other + ", not " + value);
@@ -75,7 +76,8 @@ inline std::string stated(const Claims &claims) {
     if (!(claims.goal_tolerance >= 0 && claims.goal_tolerance < kGreatest))
         throw Error("goal_tolerance must be a number from 0 on");
     if (claims.goal_tolerance > 0) text += ", \"goal_tolerance\": " + json(claims.goal_tolerance);
-    text += claim("times", claims.times, "exact", "snapshot") + claim("samples", claims.samples, "all", "none");
+    text += claim("times", claims.times, "exact", "snapshot") +
+            claim("samples", claims.samples, "all", "none");
     return text.empty() ? text : "{" + text.substr(2) + "}";
 }
 
@@ -87,7 +89,8 @@ inline void resolve(Options &options) {
             throw Error("start and goal must be configurations, as many finite numbers each");
     if (!options.world) {
         if (options.robot && options.robot->kind != "opaque")
-            throw Error("robot " + options.robot->kind + " needs a world; without one it is opaque");
+            throw Error("robot " + options.robot->kind +
+                        " needs a world; without one it is opaque");
         std::vector<Point> places{options.start, options.goal};
         for (Point &place : places) place.resize(dof < 3 ? 2 : 3);
         options.world = World::unknown(places);
@@ -99,8 +102,8 @@ inline void resolve(Options &options) {
     if (robot.kind == "opaque") robot = Robot::opaque(robot.dof ? robot.dof : dof, dim);
     const std::size_t wanted = robot.kind == "point" ? dim : robot.dof ? robot.dof : dof;
     if (dof != wanted)
-        throw Error("start must be " + std::to_string(wanted) + " numbers for robot " + robot.kind + ", not " +
-                    std::to_string(dof));
+        throw Error("start must be " + std::to_string(wanted) + " numbers for robot " + robot.kind +
+                    ", not " + std::to_string(dof));
     const bool timed = options.time_limit.has_value(), counted = options.iterations.has_value();
     if (timed && !(*options.time_limit > 0 && *options.time_limit <= 1e9))
         throw Error("time_limit must be above 0 and at most 1e9 seconds");
@@ -117,24 +120,25 @@ inline std::map<std::string, std::string> manifest(const Options &options, std::
     std::string params;
     for (const auto &[name, value] : options.params)
         params += (params.empty() ? "" : ", ") + json_text(name) + ": " + value.json;
-    std::string scenario = "{\"world\": " + json_text(options.world->name()) + ", \"robot\": " + json_text(robot.spec) +
-                           ", \"planner\": " + json_text(options.planner) + ", \"params\": {" + params +
-                           "}, \"start\": " + start + ", \"goal\": " + goal +
+    std::string scenario = "{\"world\": " + json_text(options.world->name()) +
+                           ", \"robot\": " + json_text(robot.spec) +
+                           ", \"planner\": " + json_text(options.planner) + ", \"params\": {" +
+                           params + "}, \"start\": " + start + ", \"goal\": " + goal +
                            ", \"seed\": " + std::to_string(options.seed) + ", \"smooth\": false";
     if (options.iterations) scenario += ", \"iterations\": " + std::to_string(*options.iterations);
     if (options.time_limit) scenario += ", \"time\": " + json(*options.time_limit);
-    std::map<std::string, std::string> texts{
-        {"format", "3"},  // events of graphs may follow
-        {"scenario", scenario + "}"},
-        {"start", start},
-        {"goal", goal},
-        {"dim", std::to_string(options.world->dim())},
-        {"dof", std::to_string(options.start.size())},
-        {"epoch_ns", std::to_string(epoch_ns)},
-        {"made_by", "{\"brrt.hpp\": \"1\"}"},
-        {"robot", robot.definition}};
+    std::map<std::string, std::string> texts{{"format", "3"},  // events of graphs may follow
+                                             {"scenario", scenario + "}"},
+                                             {"start", start},
+                                             {"goal", goal},
+                                             {"dim", std::to_string(options.world->dim())},
+                                             {"dof", std::to_string(options.start.size())},
+                                             {"epoch_ns", std::to_string(epoch_ns)},
+                                             {"made_by", "{\"brrt.hpp\": \"1\"}"},
+                                             {"robot", robot.definition}};
     if (!options.contract.empty()) texts["contract"] = options.contract;
-    if (const std::string claims = stated(options.claims); !claims.empty()) texts["claims"] = claims;
+    if (const std::string claims = stated(options.claims); !claims.empty())
+        texts["claims"] = claims;
     return texts;
 }
 

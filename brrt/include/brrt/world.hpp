@@ -31,9 +31,12 @@ class Configuration {
   public:
     Configuration() = default;
     Configuration(const double *values, std::size_t count) : values_(values), count_(count) {}
-    Configuration(std::initializer_list<double> values) : Configuration(values.begin(), values.size()) {}
-    template <class T, class = decltype(static_cast<const double *>(std::declval<const T &>().data()))>
-    Configuration(const T &values) : Configuration(values.data(), static_cast<std::size_t>(values.size())) {}
+    Configuration(std::initializer_list<double> values)
+        : Configuration(values.begin(), values.size()) {}
+    template <class T,
+              class = decltype(static_cast<const double *>(std::declval<const T &>().data()))>
+    Configuration(const T &values)
+        : Configuration(values.data(), static_cast<std::size_t>(values.size())) {}
 
     const double *data() const { return values_; }
     std::size_t size() const { return count_; }
@@ -49,11 +52,13 @@ constexpr double kGreatest = 1e100;  // of a coordinate, as in Python: squares m
 
 inline bool possible(Configuration q) {
     // Not a number is not less than anything.
-    return std::all_of(q.data(), q.data() + q.size(), [](double x) { return std::abs(x) < kGreatest; });
+    return std::all_of(q.data(), q.data() + q.size(),
+                       [](double x) { return std::abs(x) < kGreatest; });
 }
 
 /// Return a list of rows of numbers, each of which must have `width` of them (0: any number).
-inline std::string rows(const std::string &name, const std::vector<Point> &values, std::size_t width) {
+inline std::string rows(const std::string &name, const std::vector<Point> &values,
+                        std::size_t width) {
     std::string text = "[";
     for (const Point &row : values) {
         if ((width && row.size() != width) || !possible(row))
@@ -74,7 +79,8 @@ inline std::string polygons(const std::string &name, const std::vector<std::vect
             const double turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]);
             left |= turn > 0, right |= turn < 0;
         }
-        if (part.size() < 2 || (left && right)) throw Error(name + " must be convex; cut it into convex parts");
+        if (part.size() < 2 || (left && right))
+            throw Error(name + " must be convex; cut it into convex parts");
         text += (text.size() > 1 ? ", " : "") + vertices;
     }
     return text + "]";
@@ -158,7 +164,8 @@ class World {
         if (dim() != 2) throw Error("grids are for 2D worlds");
         if (grid.rows == 0 || grid.columns == 0 || grid.blocked.size() != grid.rows * grid.columns)
             throw Error("grid: blocked must have rows x columns values");
-        if (!(grid.resolution > 0) || grid.origin.size() != 2) throw Error("grid: resolution must be above 0");
+        if (!(grid.resolution > 0) || grid.origin.size() != 2)
+            throw Error("grid: resolution must be above 0");
         grid_ = {std::move(grid)};
         return *this;
     }
@@ -175,13 +182,16 @@ class World {
         text += ", \"upper\": " + detail::json(upper_.data(), dim());
         if (!balls_.empty()) text += ", \"balls\": " + detail::rows("balls", balls_, dim() + 1);
         if (!boxes_.empty()) text += ", \"boxes\": " + detail::rows("boxes", boxes_, 2 * dim());
-        if (!polygons_.empty()) text += ", \"polygons\": " + detail::polygons("polygons", polygons_);
+        if (!polygons_.empty())
+            text += ", \"polygons\": " + detail::polygons("polygons", polygons_);
         for (const Grid &grid : grid_) {
             text += ", \"grid\": {\"rows\": " + std::to_string(grid.rows);
             text += ", \"columns\": " + std::to_string(grid.columns);
             text += ", \"origin\": " + detail::json(grid.origin.data(), 2);
-            text += ", \"resolution\": " + detail::json(grid.resolution) + ", \"yaw\": " + detail::json(grid.yaw);
-            text += ", \"cells\": \"" + detail::base64(detail::zlib_stored(detail::packed(grid.blocked))) + "\"}";
+            text += ", \"resolution\": " + detail::json(grid.resolution) +
+                    ", \"yaw\": " + detail::json(grid.yaw);
+            text += ", \"cells\": \"" +
+                    detail::base64(detail::zlib_stored(detail::packed(grid.blocked))) + "\"}";
         }
         return text + (bounded_ ? "}" : ", \"bounded\": false}");
     }
@@ -195,7 +205,8 @@ class World {
     bool bounded_ = true;
 };
 
-/// What moves: its name and definition as brrt reads them, and its metric, which costs have by default.
+/// What moves: its name and definition as brrt reads them, and its metric, which costs have by
+/// default.
 struct Robot {
     std::string kind;        ///< A registered robot.
     std::string definition;  ///< JSON, as `Robot.to_json()` of brrt in Python.
@@ -207,26 +218,32 @@ struct Robot {
     static Robot point() { return {"point", head("point") + "}", "point", 0, nullptr}; }
 
     /// A body of convex polygons in the plane, at pose (x, y, theta) = (0, 0, 0). Its metric is
-    /// hypot(dx, dy) + radius |dtheta|, where radius is the largest distance of a vertex from (0, 0).
+    /// hypot(dx, dy) + radius |dtheta|, where radius is the largest distance of a vertex from (0,
+    /// 0).
     static Robot polygon(const std::vector<std::vector<Point>> &parts) {
         double radius = 0;
         const std::string json = detail::polygons("polygons of the robot", parts);
         for (const auto &part : parts)
-            for (const Point &vertex : part) radius = std::max(radius, std::hypot(vertex[0], vertex[1]));
+            for (const Point &vertex : part)
+                radius = std::max(radius, std::hypot(vertex[0], vertex[1]));
         const auto distance = [radius](const double *a, const double *b) {
             constexpr double kTurn = 6.283185307179586;
-            return std::hypot(b[0] - a[0], b[1] - a[1]) + radius * std::abs(std::remainder(b[2] - a[2], kTurn));
+            return std::hypot(b[0] - a[0], b[1] - a[1]) +
+                   radius * std::abs(std::remainder(b[2] - a[2], kTurn));
         };
-        return {"polygon", head("polygon") + ", \"polygons\": " + json + "}", "polygon", 3, distance};
+        return {"polygon", head("polygon") + ", \"polygons\": " + json + "}", "polygon", 3,
+                distance};
     }
 
-    /// A robot of which nothing is known but how many numbers a configuration has, 1 to 32; the first
-    /// of them are drawn as a position. Nothing is said of its collisions; its metric is Euclidean.
+    /// A robot of which nothing is known but how many numbers a configuration has, 1 to 32; the
+    /// first of them are drawn as a position. Nothing is said of its collisions; its metric is
+    /// Euclidean.
     static Robot opaque(std::size_t dof, std::size_t drawn = 2) {
-        if (dof < 1 || dof > 32) throw Error("a configuration must have 1 to 32 numbers, not " + std::to_string(dof));
+        if (dof < 1 || dof > 32)
+            throw Error("a configuration must have 1 to 32 numbers, not " + std::to_string(dof));
         const std::string count = std::to_string(dof);
-        const std::string json =
-            head("opaque") + ", \"numbers\": " + count + ", \"drawn\": " + std::to_string(drawn) + "}";
+        const std::string json = head("opaque") + ", \"numbers\": " + count +
+                                 ", \"drawn\": " + std::to_string(drawn) + "}";
         return {"opaque", json, "opaque:numbers=" + count, dof, nullptr};
     }
 

@@ -48,7 +48,8 @@ inline std::string base64(std::string_view data) {
     for (std::size_t at = 0; at < data.size(); at += 3) {
         std::uint32_t bits = 0;
         for (std::size_t k = 0; k < 3; ++k)
-            bits = bits << 8 | (at + k < data.size() ? static_cast<std::uint8_t>(data[at + k]) : 0u);
+            bits =
+                bits << 8 | (at + k < data.size() ? static_cast<std::uint8_t>(data[at + k]) : 0u);
         for (std::size_t k = 0; k < 4; ++k)
             text += at + k > data.size() ? '=' : kDigits[bits >> (18 - 6 * k) & 63];
     }

@@ -48,7 +48,8 @@ inline std::uint32_t crc32(std::string_view data, std::uint32_t crc = 0) {
         crc = 0;
         for (std::size_t k = 0; k < 8; ++k) crc ^= table[7 - k][word >> (8 * k) & 255];
     }
-    for (; left > 0; --left, ++at) crc = (crc >> 8) ^ table[0][(crc ^ static_cast<std::uint8_t>(*at)) & 255];
+    for (; left > 0; --left, ++at)
+        crc = (crc >> 8) ^ table[0][(crc ^ static_cast<std::uint8_t>(*at)) & 255];
     return ~crc;
 }
 
@@ -85,8 +86,8 @@ struct Chunk {
 /// Return the channel of a kind, and its schema; 0 stands for no schema in MCAP.
 inline std::uint16_t channel_of(std::size_t kind) { return static_cast<std::uint16_t>(kind + 1); }
 
-/// An MCAP file of the ros2 profile. All methods throw std::system_error where it cannot be written;
-/// what it holds then ends with the last whole chunk, and can be read.
+/// An MCAP file of the ros2 profile. All methods throw std::system_error where it cannot be
+/// written; what it holds then ends with the last whole chunk, and can be read.
 class McapFile {
   public:
     using Texts = std::map<std::string, std::string>;
@@ -106,12 +107,14 @@ class McapFile {
     void metadata(const std::string &name, Texts texts) {
         std::string dumped = "[";
         for (const auto &[key, value] : texts)
-            dumped += (dumped.size() > 1 ? ", [" : "[") + json_text(key) + ", " + json_text(value) + "]";
+            dumped +=
+                (dumped.size() > 1 ? ", [" : "[") + json_text(key) + ", " + json_text(value) + "]";
         texts["crc32"] = std::to_string(crc32(dumped + "]"));
         Bytes pairs;
         for (const auto &[key, value] : texts) pairs.text(key).text(utf8(value));
         const auto [at, size] = record(12, Bytes().text(name).text(pairs));
-        metadata_indexes_.number<std::uint8_t>(13).block(Bytes().number(at).number(size).text(name));
+        metadata_indexes_.number<std::uint8_t>(13).block(
+            Bytes().number(at).number(size).text(name));
         ++metadata_count_;
     }
 
@@ -122,8 +125,10 @@ class McapFile {
         body.number(crc32(body));
         const auto [at, size] = record(9, body);
         Bytes entry;
-        entry.number(at).number(size).number(time_ns).number(time_ns).number<std::uint64_t>(data.size());
-        attachment_indexes_.number<std::uint8_t>(10).block(entry.text(name).text("application/json"));
+        entry.number(at).number(size).number(time_ns).number(time_ns).number<std::uint64_t>(
+            data.size());
+        attachment_indexes_.number<std::uint8_t>(10).block(
+            entry.text(name).text("application/json"));
         ++attachment_count_;
     }
 
@@ -151,7 +156,11 @@ class McapFile {
     void chunk(const Chunk &chunk) {
         const std::uint64_t at = position(), size = chunk.raw.size();
         Bytes head;
-        head.number(chunk.first_ns).number(chunk.last_ns).number(size).number(crc32(chunk.raw)).text("");
+        head.number(chunk.first_ns)
+            .number(chunk.last_ns)
+            .number(size)
+            .number(crc32(chunk.raw))
+            .text("");
         pending_.number<std::uint8_t>(6).number<std::uint64_t>(head.size() + 8 + size);
         pending_.append(head);
         pending_.block(chunk.raw);
@@ -185,16 +194,28 @@ class McapFile {
         }
         const auto kinds = static_cast<std::uint32_t>(kKindCount);
         Bytes body;
-        body.number(messages).number(static_cast<std::uint16_t>(kinds)).number(kinds).number(attachment_count_);
-        body.number(metadata_count_).number(chunk_count_).number(first_ns_).number(last_ns_).text(counts);
+        body.number(messages)
+            .number(static_cast<std::uint16_t>(kinds))
+            .number(kinds)
+            .number(attachment_count_);
+        body.number(metadata_count_)
+            .number(chunk_count_)
+            .number(first_ns_)
+            .number(last_ns_)
+            .text(counts);
         statistics.number<std::uint8_t>(11).block(body);
         const std::pair<std::uint8_t, const Bytes *> groups[] = {
-            {std::uint8_t{3}, &schemas_},        {std::uint8_t{4}, &channels_},
-            {std::uint8_t{11}, &statistics},     {std::uint8_t{8}, &chunk_indexes_},
-            {std::uint8_t{10}, &attachment_indexes_}, {std::uint8_t{13}, &metadata_indexes_}};
+            {std::uint8_t{3}, &schemas_},
+            {std::uint8_t{4}, &channels_},
+            {std::uint8_t{11}, &statistics},
+            {std::uint8_t{8}, &chunk_indexes_},
+            {std::uint8_t{10}, &attachment_indexes_},
+            {std::uint8_t{13}, &metadata_indexes_}};
         for (const auto &[opcode, group] : groups) {
             const std::uint64_t at = start + summary.size(), size = group->size();
-            if (size) offsets.number<std::uint8_t>(14).block(Bytes().number(opcode).number(at).number(size));
+            if (size)
+                offsets.number<std::uint8_t>(14).block(
+                    Bytes().number(opcode).number(at).number(size));
             summary.append(*group);
         }
         const std::uint64_t offsets_at = start + summary.size();
@@ -237,7 +258,8 @@ class McapFile {
     static constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
 
     [[noreturn]] void fail() const {
-        throw std::system_error(errno ? errno : EIO, std::generic_category(), "cannot write " + path_);
+        throw std::system_error(errno ? errno : EIO, std::generic_category(),
+                                "cannot write " + path_);
     }
 
     std::uint64_t position() const { return written_ + pending_.size(); }

@@ -24,7 +24,8 @@ class Metrics {
         status_ = status;
     }
 
-    void path(Stage stage, double cost, std::vector<double> waypoints, std::int64_t t, std::int64_t iteration) {
+    void path(Stage stage, double cost, std::vector<double> waypoints, std::int64_t t,
+              std::int64_t iteration) {
         Path found{cost, std::move(waypoints)};
         if (stage == Stage::smoothed) {
             smoothed_ = std::move(found);
@@ -38,7 +39,9 @@ class Metrics {
 
     /// Return each metric as JSON.
     std::map<std::string, std::string> texts(std::size_t dof, std::int64_t iterations) const {
-        const auto seconds = [this](std::int64_t t) { return json(static_cast<double>(t - began_) / 1e9); };
+        const auto seconds = [this](std::int64_t t) {
+            return json(static_cast<double>(t - began_) / 1e9);
+        };
         std::uint64_t events = 0;
         std::map<std::string, std::string> found;
         for (std::size_t kind = 0; kind < kKindCount; ++kind) {
@@ -59,11 +62,13 @@ class Metrics {
         found["smoothed_path"] = smoothed_.text(dof);
         found["plan_time_s"] = seconds(ended_);
         found["smooth_time_s"] = none;
-        found["moves"] = last.waypoints.empty() ? none : std::to_string(last.waypoints.size() / dof - 1);
+        found["moves"] =
+            last.waypoints.empty() ? none : std::to_string(last.waypoints.size() / dof - 1);
         found["first_path_s"] = solved() ? seconds(first_.t) : none;
         found["first_path_iteration"] = solved() ? std::to_string(first_.iteration) : none;
         found["first_path_cost"] = solved() ? json(first_.cost) : none;
-        for (const char *name : {"max_move_time_s", "deadline_misses", "charged_moves", "stays"}) found[name] = none;
+        for (const char *name : {"max_move_time_s", "deadline_misses", "charged_moves", "stays"})
+            found[name] = none;
         return found;
     }
 

@@ -19,7 +19,9 @@ class Nodes {
     int count() const { return static_cast<int>(parent_.size()); }
     int parent(int node) const { return parent_[index(node)]; }
     const double *place(int node) const { return &q_[index(node) * dof_]; }
-    bool has(int node) const { return node >= 0 && node < count() && state_[index(node)] != State::removed; }
+    bool has(int node) const {
+        return node >= 0 && node < count() && state_[index(node)] != State::removed;
+    }
 
     /// Return a node's cost-to-come; infinite if no root is above it.
     double cost(int node) const {
@@ -52,14 +54,16 @@ class Nodes {
             const int at = below_.back();
             below_.pop_back();
             cost_[index(at)] += change;
-            for (int child = first_[index(at)]; child >= 0; child = next_[index(child)]) below_.push_back(child);
+            for (int child = first_[index(at)]; child >= 0; child = next_[index(child)])
+                below_.push_back(child);
         }
     }
 
     void link(int node, int other) { links_.insert(pair(node, other)); }
 
     bool has_edge(int node, int other) const {
-        return parent(node) == other || parent(other) == node || links_.count(pair(node, other)) > 0;
+        return parent(node) == other || parent(other) == node ||
+               links_.count(pair(node, other)) > 0;
     }
 
     /// Remove the link between two nodes, and the edge if one is the other's parent.
@@ -89,7 +93,8 @@ class Nodes {
     static std::size_t index(int node) { return static_cast<std::size_t>(node); }
 
     static std::uint64_t pair(int a, int b) {
-        return static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint32_t>(std::max(a, b));
+        return static_cast<std::uint64_t>(std::min(a, b)) << 32 |
+               static_cast<std::uint32_t>(std::max(a, b));
     }
 
     void append(const double *q, int parent, double cost, State state) {

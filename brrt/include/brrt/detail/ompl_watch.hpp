@@ -27,7 +27,8 @@ class Listener {
     virtual void sampled(const ob::State *state) noexcept = 0;
 };
 
-/// Who listens at the moment. Planners keep samplers from one solve to the next, beyond the listener.
+/// Who listens at the moment. Planners keep samplers from one solve to the next, beyond the
+/// listener.
 struct Ear {
     Listener *listener = nullptr;
 };
@@ -62,8 +63,8 @@ class WatchedValidator : public ob::MotionValidator {
     const EarPtr ear_;
 };
 
-/// A sampler that tells what it drew. It is a sampler of the usual kind itself, and not one around it:
-/// that would take a seed of OMPL's generator, so that a recorded run would differ from others.
+/// A sampler that tells what it drew. It is a sampler of the usual kind itself, and not one around
+/// it: that would take a seed of OMPL's generator, so that a recorded run would differ from others.
 template <class Usual>
 class WatchedSampler : public Usual {
   public:
@@ -93,10 +94,13 @@ class WatchedSampler : public Usual {
 /// Reads and sets the sampler allocator of a space, which OMPL lets one set only.
 class SamplerAllocator : private ob::StateSpace {
   public:
-    static ob::StateSamplerAllocator &of(ob::StateSpace &space) { return space.*(&SamplerAllocator::ssa_); }
+    static ob::StateSamplerAllocator &of(ob::StateSpace &space) {
+        return space.*(&SamplerAllocator::ssa_);
+    }
 };
 
-/// Return what makes the usual samplers of a space, watched; empty for spaces with samplers of their own.
+/// Return what makes the usual samplers of a space, watched; empty for spaces with samplers of
+/// their own.
 inline ob::StateSamplerAllocator watched_sampler(const ob::StateSpace &space, const EarPtr &ear) {
     const auto is = [&](const auto &...kind) { return ((typeid(space) == kind) || ...); };
     if (is(typeid(ob::RealVectorStateSpace)))
@@ -110,9 +114,11 @@ inline ob::StateSamplerAllocator watched_sampler(const ob::StateSpace &space, co
     if (is(typeid(ob::CompoundStateSpace), typeid(ob::SE2StateSpace), typeid(ob::SE3StateSpace)))
         return [ear](const ob::StateSpace *of) -> ob::StateSamplerPtr {  // as OMPL makes it
             const auto *whole = of->as<ob::CompoundStateSpace>();
-            const auto sampler = std::make_shared<WatchedSampler<ob::CompoundStateSampler>>(of, ear);
+            const auto sampler =
+                std::make_shared<WatchedSampler<ob::CompoundStateSampler>>(of, ear);
             double sum = 0;
-            for (unsigned i = 0; i < whole->getSubspaceCount(); ++i) sum += whole->getSubspaceWeight(i);
+            for (unsigned i = 0; i < whole->getSubspaceCount(); ++i)
+                sum += whole->getSubspaceWeight(i);
             for (unsigned i = 0; i < whole->getSubspaceCount(); ++i) {
                 const bool weighed = sum >= std::numeric_limits<double>::epsilon();
                 sampler->addSampler(whole->getSubspace(i)->allocStateSampler(),
@@ -123,31 +129,27 @@ inline ob::StateSamplerAllocator watched_sampler(const ob::StateSpace &space, co
     return {};
 }
 
-/// Puts a watched validator and sampler into a space, and puts the old ones back.
+/// Puts a watched validator and sampler into a space, and puts the old ones back. The space stays
+/// set up: setting it up anew would draw random numbers for its projections.
 class Watch {
   public:
     Watch(const ob::SpaceInformationPtr &si, const EarPtr &ear, bool samples)
-        : si_(si), validator_(si->getMotionValidator()), was_setup_(si->isSetup()) {
+        : si_(si), validator_(si->getMotionValidator()) {
         auto &allocator = SamplerAllocator::of(*si->getStateSpace());
-        si->setMotionValidator(std::make_shared<WatchedValidator>(si, validator_, ear));
-        if (was_setup_) si->setup();
-        if (samples && !allocator) allocator = watched_sampler(*si->getStateSpace(), ear), sets_sampler_ = true;
+        si->getMotionValidator() = std::make_shared<WatchedValidator>(si, validator_, ear);
+        sets_sampler_ = samples && !allocator;
+        if (sets_sampler_) allocator = watched_sampler(*si->getStateSpace(), ear);
     }
     Watch(const Watch &) = delete;
     Watch &operator=(const Watch &) = delete;
     ~Watch() {
-        si_->setMotionValidator(validator_);
+        si_->getMotionValidator() = validator_;
         if (sets_sampler_) si_->getStateSpace()->clearStateSamplerAllocator();
-        try {
-            if (was_setup_) si_->setup();
-        } catch (...) {  // it was set up with these parts before
-        }
     }
 
   private:
     const ob::SpaceInformationPtr si_;
     const ob::MotionValidatorPtr validator_;
-    const bool was_setup_;
     bool sets_sampler_ = false;
 };
 

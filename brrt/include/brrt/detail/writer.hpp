@@ -48,9 +48,10 @@ class Writer {
     using OnError = std::function<void(const std::string &)>;
     using Lock = std::unique_lock<std::mutex>;
 
-    /// Start the thread. The first chunk begins with `declarations`. `on_error` is called once, from it or from `close`, if the file cannot be
-    /// written any more; what comes then is dropped.
-    Writer(std::unique_ptr<McapFile> file, const Bytes &declarations, std::uint64_t epoch_ns, OnError on_error)
+    /// Start the thread. The first chunk begins with `declarations`. `on_error` is called once,
+    /// from it or from `close`, if the file cannot be written any more; what comes then is dropped.
+    Writer(std::unique_ptr<McapFile> file, const Bytes &declarations, std::uint64_t epoch_ns,
+           OnError on_error)
         : file_(std::move(file)), epoch_ns_(epoch_ns), on_error_(std::move(on_error)) {
         chunk_.raw = declarations;
         thread_ = std::thread([this] { work(); });
