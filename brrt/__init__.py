@@ -79,6 +79,8 @@ __all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
+    if name == "ompl":
+        return import_module("brrt.ompl")
     if name not in _MODULES:
         raise AttributeError(f"module 'brrt' has no attribute {name!r}")
     value = getattr(import_module(f"brrt.{_MODULES[name]}"), name)

@@ -362,6 +362,15 @@ class Recorder(GraphEvents):
             buffer.state[FIRST_SEQ] += len(events)
             buffer.state[[COUNT, POINTS]] = 0
 
+    def put(self, columns: EventColumns) -> None:
+        """Record events other than paths of a caller that knows them to be possible.
+
+        Nodes have the caller's numbers; events by other methods must not name them.
+        """
+        with self._lock:
+            columns = replace(columns, t=rising(columns.t, self._rows.last_t))
+            self._put_columns(columns, columns.events()[Kind.PATH])
+
     def _put_columns(self, columns: EventColumns, paths: Table) -> None:
         """Record checked events, of which the paths have waypoints."""
         done = 0

@@ -1,0 +1,350 @@
+"""What changed between two looks at a planner's data, as events in a possible order."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brrt.event_columns import CONFIGURATIONS, INTEGERS, REALS, WIDTH, EventColumns
+from brrt.events import Kind, Reason
+from brrt.ompl.checks import Checks, find_last, hash_rows
+from brrt.ompl.planner_data import PlannerGraph
+from brrt.recorder.nodes import Nodes
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+_FIRST, _LATE, _LAST = -1, 1 << 40, 1 << 41
+"""Ranks of events of the same moment: cuts; links and rejections; removals. Those of nodes that join
+or get another parent are their depths."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """When the planner's data were read.
+
+    Attributes:
+        t: Time in ns since the run began.
+        iteration: The planner's iteration.
+    """
+
+    t: int
+    iteration: int
+
+
+def rise(values: Ints, above: Ints) -> Ints:
+    """Return the greatest value of each row and of those above it, shape (n,).
+
+    Args:
+        values: A value of each row, shape (n,).
+        above: The row above each row, itself at the top, shape (n,).
+    """
+    while True:
+        values, further = np.maximum(values, values[above]), above[above]
+        if (further == above).all():
+            return values
+        above = further
+
+
+def depths(above: Ints) -> Ints:
+    """Return how many rows are above each row, shape (n,); see `rise`."""
+    depth = (above != np.arange(len(above))).astype(np.int64)
+    while True:
+        depth, further = depth + depth[above], above[above]
+        if (further == above).all():
+            return depth
+        above = further
+
+
+class _Batch:
+    """Events in the making."""
+
+    def __init__(self, dof: int) -> None:
+        self._dof, self._parts = dof, list[tuple[NDArray[np.generic], ...]]()
+
+    def add(
+        self, kind: Kind | Ints, t: Ints, iteration: Ints, rank: Ints | int, *integers: Ints | int,
+        real: Floats | float = 0.0, q: Floats | None = None,
+    ) -> None:  # fmt: skip
+        """Add events; the integers in the order of `brrt.events.FIELDS`."""
+        n = len(t)
+        whole, reals = np.zeros((n, WIDTH[INTEGERS]), np.int32), np.zeros((n, WIDTH[REALS]))
+        for column, values in enumerate(integers):
+            whole[:, column] = values
+        reals[:, 0] = real
+        rows = np.zeros((n, WIDTH[CONFIGURATIONS] * self._dof)) if q is None else q
+        kinds = np.broadcast_to(np.asarray(kind, np.uint8), n)
+        self._parts.append((t, iteration, np.broadcast_to(rank, n), kinds, whole, reals, rows))
+
+    def columns(self, last: Moment) -> EventColumns:
+        """Return the events in order, none before the last moment."""
+        t, iteration, rank, kind, whole, reals, q = (
+            np.concatenate(parts) for parts in zip(*self._parts, strict=True)
+        )
+        order = np.lexsort((rank, t))
+        steps = np.arange(len(order))
+        t = np.maximum.accumulate(np.maximum(t[order] - steps, last.t + 1)) + steps
+        iteration = np.maximum.accumulate(np.maximum(iteration[order], last.iteration))
+        return EventColumns(
+            0, self._dof, kind[order], t, iteration, whole[order], reals[order], q[order],
+            np.empty((0, self._dof)),
+        )  # fmt: skip
+
+
+class Changes:
+    """The graph as recorded so far; `update` returns what is new.
+
+    A vertex is known by its configuration and tree: OMPL uses the memory of states again. Rows of
+    the arrays are vertices ever seen.
+
+    Args:
+        dof: Numbers in a configuration.
+        start: The start configuration, shape (dof,); its vertex is the root of tree 0.
+
+    Attributes:
+        q: Configurations, shape (k, dof).
+        tree: The tree of each vertex, shape (k,).
+        number: Its number in the tree, shape (k,).
+        parent: Row of its parent, or -1, shape (k,).
+        present: Whether it is there now, shape (k,).
+        rows: Row of each vertex of the last graph, shape (n,).
+        trees: The nodes of both trees, for costs.
+    """
+
+    def __init__(self, dof: int, start: Floats) -> None:
+        self._dof, self._start = dof, start
+        self.q, self._hash = np.empty((0, dof)), np.empty(0, np.uint64)
+        self._key, self._birth = np.empty(0, np.uint64), np.empty(0, np.int64)
+        self.tree, self.number, self.parent, self.rows = (np.empty(0, np.int64) for _ in range(4))
+        self.present = np.empty(0, np.bool_)
+        self._links, self._bridges = set[tuple[int, int]](), set[tuple[int, int]]()
+        self.trees = Nodes(0), Nodes(0)
+        self._has_root = [False, False]
+        self._last = Moment(0, 0)
+
+    def update(
+        self,
+        graph: PlannerGraph,
+        checks: Checks,
+        now: Moment,
+        length: Callable[[Ints, Ints], Floats],
+    ) -> EventColumns:
+        """Return the events that lead from the last graph to this one.
+
+        Args:
+            graph: The planner's graph now.
+            checks: The motions that were checked since the last graph.
+            now: When the graph was read.
+            length: Returns the costs of motions between vertices of the graph.
+        """
+        known = len(self.q)
+        self._find_rows(graph)
+        index = np.full(len(self.q), -1)
+        index[self.rows] = np.arange(len(self.rows))
+        parent = np.full(len(self.q), -1)
+        has_parent = graph.parent >= 0
+        parent[self.rows[has_parent]] = self.rows[graph.parent[has_parent]]
+        batch = _Batch(self._dof)
+        there = index >= 0
+        self._cut(batch, parent, there, known)
+        self._grow(batch, parent, index, checks, now, known, length)
+        self._join(batch, graph, there, checks, now, length)
+        self._reject(batch, checks)
+        gone = np.flatnonzero(self.present & ~there)
+        batch.add(
+            Kind.REMOVE, np.full(len(gone), now.t), np.full(len(gone), now.iteration), _LAST,
+            self.tree[gone], self.number[gone],
+        )  # fmt: skip
+        self.parent, self.present = parent, there
+        columns = batch.columns(self._last)
+        self._set_costs(columns)
+        end = int(columns.t[-1]) if len(columns.t) else now.t
+        self._last = Moment(max(now.t, end), now.iteration)
+        return columns
+
+    def _find_rows(self, graph: PlannerGraph) -> None:
+        """Find the row of each vertex; append those that are new."""
+        hashes = hash_rows(graph.q)
+        keys = hashes ^ (graph.tree.astype(np.uint64) << np.uint64(63))
+        keys += _occurrences(keys)
+        present = np.flatnonzero(self.present)
+        found = find_last(self._key[present], keys)
+        self.rows = np.where(found >= 0, present[found] if len(present) else -1, -1)
+        new = np.flatnonzero(found < 0)
+        self.rows[new] = len(self.q) + np.arange(len(new))
+        nothing = np.full(len(new), -1)
+        for name, values in (
+            ("q", graph.q[new]), ("_hash", hashes[new]), ("_key", keys[new]), ("_birth", nothing),
+            ("tree", graph.tree[new]), ("number", nothing), ("parent", nothing),
+            ("present", nothing > 0),
+        ):  # fmt: skip
+            setattr(self, name, np.concatenate([getattr(self, name), values]))
+
+    def _cut(self, batch: _Batch, parent: Ints, there: Flags, known: int) -> None:
+        """Add the edges to parents that are gone; first of all, or others would make circles."""
+        lost = there[:known] & (self.parent[:known] >= 0) & (parent[:known] < 0)
+        rows = np.flatnonzero(lost)
+        first, iteration = (
+            np.full(len(rows), self._last.t),
+            np.full(len(rows), self._last.iteration),
+        )
+        batch.add(
+            Kind.CUT, first, iteration, _FIRST,
+            self.tree[rows], self.number[rows], self.number[self.parent[rows]],
+        )  # fmt: skip
+
+    def _grow(
+        self, batch: _Batch, parent: Ints, index: Ints, checks: Checks, now: Moment, known: int,
+        length: Callable[[Ints, Ints], Floats],
+    ) -> None:  # fmt: skip
+        """Add the nodes that joined, and those that have another parent."""
+        every, has_parent = np.arange(len(parent)), parent >= 0
+        is_new = every >= known
+        changed = np.flatnonzero(has_parent & (is_new | (parent != self.parent)) | is_new)
+        up = parent[changed]
+        found = checks.between(self._hash[changed], self._hash[np.where(up >= 0, up, changed)])
+        joins = changed >= known
+        found = np.where(joins & (found < 0), checks.of_configurations(self._hash[changed]), found)
+        at = np.where(found >= 0, checks.t[found] if len(checks.t) else now.t, now.t)
+        roots = self._roots(changed[joins & (up < 0)])
+        at[np.isin(changed, roots)] = self._last.t
+        t = np.full(len(parent), -1)
+        t[changed] = at
+        self._born_before_children(t, parent, changed[joins & (found < 0)], now)
+        # A node joins after its parent; a rewire comes after all that changes above, or there
+        # could be a circle for a while.
+        above = np.where(is_new & has_parent & is_new[parent], parent, every)
+        born = rise(np.where(is_new, t, -1), above)
+        above = np.where(has_parent, parent, every)
+        moved, depth = rise(np.where(is_new, born, t), above), depths(above)
+        t = np.where(is_new, born, moved)[changed]
+        self._birth[changed[joins]] = t[joins]
+        self._give_numbers(changed[joins], t[joins], depth)
+        lengths = np.zeros(len(changed))
+        inner = up >= 0
+        lengths[inner] = length(index[up[inner]], index[changed[inner]])
+        kind = np.where(joins, int(Kind.EDGE), int(Kind.REWIRE))
+        kind[joins & (up < 0) & ~np.isin(changed, roots)] = int(Kind.VERTEX)
+        batch.add(
+            kind, t, _iterations(t, checks, now), depth[changed], self.tree[changed],
+            self.number[changed], np.where(inner, self.number[up], -1), real=lengths,
+            q=self.q[changed] * (kind != Kind.REWIRE)[:, None],
+        )  # fmt: skip
+
+    def _roots(self, rows: Ints) -> list[int]:
+        """Return which new nodes without parents are roots: one a tree."""
+        found = []
+        for tree in (0, 1):
+            own = rows[self.tree[rows] == tree]
+            if tree == 0:
+                own = own[(self.q[own] == self._start).all(axis=1)]
+            if len(own) and not self._has_root[tree]:
+                self._has_root[tree] = True
+                found.append(int(own[0]))
+        return found
+
+    @staticmethod
+    def _born_before_children(t: Ints, parent: Ints, unknown: Ints, now: Moment) -> None:
+        """Give nodes whose motion was not checked by itself the time of their first child."""
+        rows = np.flatnonzero(np.isin(parent, unknown)) if len(unknown) else unknown
+        while len(rows):
+            before = t[unknown].copy()
+            np.minimum.at(t, parent[rows], np.where(t[rows] < 0, now.t, t[rows]))
+            if (t[unknown] == before).all():
+                return
+
+    def _give_numbers(self, rows: Ints, t: Ints, depth: Ints) -> None:
+        """Number new nodes in the order in which their events will be."""
+        order = rows[np.lexsort((depth[rows], t))]
+        for tree, nodes in enumerate(self.trees):
+            own = order[self.tree[order] == tree]
+            self.number[own] = len(nodes) + np.arange(len(own))
+
+    def _join(
+        self, batch: _Batch, graph: PlannerGraph, there: Flags, checks: Checks, now: Moment,
+        length: Callable[[Ints, Ints], Floats],
+    ) -> None:  # fmt: skip
+        """Add edges beside those to parents, and take away those that are gone."""
+        pairs = np.sort(self.rows[graph.links], axis=1)
+        links = dict(zip(map(tuple, pairs.tolist()), graph.links.tolist(), strict=True))
+        bridges = dict(
+            zip(map(tuple, self.rows[graph.bridges].tolist()), graph.bridges.tolist(), strict=True)
+        )
+        for kind, new, old in (
+            (Kind.LINK, links, self._links), (Kind.CONNECT, bridges, self._bridges),
+        ):  # fmt: skip
+            fresh = [pair for pair in new if pair not in old]
+            a, b = np.array(fresh, np.int64).reshape(-1, 2).T
+            i, j = np.array([new[pair] for pair in fresh], np.int64).reshape(-1, 2).T
+            found = checks.between(self._hash[a], self._hash[b])
+            t = np.where(found >= 0, checks.t[found] if len(checks.t) else now.t, now.t)
+            t = np.maximum(t, np.maximum(self._birth[a], self._birth[b]))
+            integers = [self.number[a], self.number[b]]
+            if kind is Kind.LINK:
+                integers.insert(0, self.tree[a])
+            batch.add(kind, t, _iterations(t, checks, now), _LATE, *integers, real=length(i, j))
+        lost = [pair for pair in self._links if pair not in links and there[list(pair)].all()]
+        a, b = np.array(lost, np.int64).reshape(-1, 2).T
+        when = np.full(len(a), now.t), np.full(len(a), now.iteration)
+        batch.add(Kind.CUT, *when, _LATE, self.tree[a], self.number[a], self.number[b])
+        self._links, self._bridges = set(links), set(bridges)
+
+    def _reject(self, batch: _Batch, checks: Checks) -> None:
+        """Add motions that are not free, as far as a node is at one end."""
+        blocked = np.flatnonzero(~checks.is_free)
+        alive = np.flatnonzero(self._birth >= 0)
+        ends = [find_last(self._hash[alive], each[blocked]) for each in (checks.begin, checks.end)]
+        if not len(alive):
+            return
+        at = np.where(ends[0] >= 0, ends[0], ends[1])
+        target = np.where((ends[0] >= 0)[:, None], checks.q[blocked], checks.origin[blocked])
+        rows, blocked, target = alive[at[at >= 0]], blocked[at >= 0], target[at >= 0]
+        t = np.maximum(checks.t[blocked], self._birth[rows])
+        batch.add(
+            Kind.REJECT, t, checks.iteration[blocked], _LATE, self.tree[rows], self.number[rows],
+            int(Reason.COLLISION), q=target,
+        )  # fmt: skip
+
+    def _set_costs(self, columns: EventColumns) -> None:
+        """Turn the lengths of motions into costs-to-come."""
+        events = zip(
+            range(len(columns.kind)), columns.kind.tolist(), columns.integers.tolist(),
+            columns.reals[:, 0].tolist(), strict=True,
+        )  # fmt: skip
+        costs = columns.reals[:, 0]
+        for row, kind, (first, second, third), length in events:
+            if kind == Kind.EDGE or kind == Kind.REWIRE:
+                nodes = self.trees[first]
+                total = length if third < 0 else nodes.cost[third] + length
+                if kind == Kind.EDGE:
+                    nodes.join((), third, total)
+                else:
+                    nodes.move(second, third, total)
+                costs[row] = total
+            elif kind == Kind.VERTEX:
+                self.trees[first].join_vertex(())
+            elif kind == Kind.CUT:
+                self.trees[first].cut(second, third)
+            elif kind == Kind.REMOVE:
+                self.trees[first].remove(second)
+            elif kind == Kind.CONNECT:
+                costs[row] = self.trees[0].cost[first] + length + self.trees[1].cost[second]
+
+
+def _occurrences(keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return how many earlier rows have the same key, shape (n,)."""
+    order = np.argsort(keys, kind="stable")
+    ordered, steps = keys[order], np.arange(len(keys))
+    begins = np.append(True, ordered[1:] != ordered[:-1])[: len(keys)]
+    count = np.empty(len(keys), np.uint64)
+    count[order] = steps - np.maximum.accumulate(np.where(begins, steps, 0))
+    return count
+
+
+def _iterations(t: Ints, checks: Checks, now: Moment) -> Ints:
+    """Return the iteration of each time, shape (n,)."""
+    at = np.searchsorted(checks.t, t, side="right") - 1
+    known = (at >= 0) & (t < now.t)
+    return np.where(known, checks.iteration[at] if len(checks.t) else 0, now.iteration)

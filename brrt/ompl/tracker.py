@@ -1,0 +1,286 @@
+"""Follows an OMPL planner while it plans, by its checks of motions and its stop condition.
+
+Three hooks of ompl 2.0.1 work in Python: a `MotionValidator`, which sees each motion that is checked; a
+`PlannerTerminationCondition`, which is asked in each iteration; and `getPlannerData` within it.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from ompl import base
+
+from brrt.errors import BrrtError
+from brrt.events import Status
+from brrt.ompl.changes import Changes, Moment
+from brrt.ompl.checks import Checks
+from brrt.ompl.planner_data import GRAPHS, PlannerGraph, read_graph
+from brrt.ompl.problem import Problem
+from brrt.recorder.recorder import Recorder
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_WAIT_NS = 250_000_000
+"""How long the planner's data are not read, at most."""
+
+_SHARE = 10
+"""Reading takes at most one part in so many of the time, whatever the size of the tree."""
+
+_SAME_COST = 1e-9
+"""Relative difference up to which two paths cost the same."""
+
+_FEWEST = 64
+"""Iterations between two reads, at least, as long as it takes less than `_WAIT_NS`."""
+
+_PARTIAL_MOTIONS = ("KPIECE1", "LBKPIECE1")
+"""Planners that use how far a blocked motion is free. A validator in Python cannot tell them
+(ompl 2.0.1), and would change what they do: of these the configurations are followed."""
+
+
+class Tracker:
+    """Records what a planner does.
+
+    Args:
+        problem: The planner and its problem.
+        open_recorder: Opens the recording, given the start configuration and a clock.
+        exact: Whether to read the planner's data in each iteration.
+
+    Attributes:
+        iteration: How often the planner has asked whether to stop; for PRM, its checks.
+        error: What went wrong in the recorder: nothing is recorded any more then.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        open_recorder: Callable[[Floats, Callable[[], int]], Recorder],
+        *,
+        exact: bool,
+    ) -> None:
+        self._problem, self._space, self._exact = problem, problem.space, exact
+        self._open, self._recorder = open_recorder, None
+        self._changes: Changes
+        self.iteration = 0
+        self.error: Exception | None = None
+        self._checks: list[float] = []
+        self._origin = perf_counter_ns()
+        self._held: int | None = None
+        self._end: int | None = None
+        self._due, self._due_iteration = 0, 0
+        self._best = math.inf
+        # PRM asks its condition on a thread of its own, while `solve` holds Python's lock: a
+        # condition in Python would wait forever. There checks of motions are followed alone.
+        self._by_checks = problem.name in GRAPHS
+        self._stop = base.plannerNonTerminatingCondition()
+        self._raised: BaseException | None = None
+
+    def now(self) -> int:
+        """Return the time in ns since planning began, that of the recorder left out."""
+        return perf_counter_ns() - self._origin if self._held is None else self._held
+
+    def solve(self, solve: Callable[[Any], Any], request: Any) -> Any:
+        """Plan and record; return what `solve` returns.
+
+        Args:
+            solve: Plans, given a stop condition.
+            request: How long to plan in s, or an `ompl.base.PlannerTerminationCondition`.
+        """
+        self._origin = perf_counter_ns()
+        try:
+            with self._hooked():
+                status = solve(self._condition(request))
+            if self._raised is not None:
+                raise self._raised
+        except BaseException:
+            self._close(Status.INTERRUPTED)
+            raise
+        self._finish()
+        return status
+
+    def _finish(self) -> None:
+        """Record the rest and close the recording."""
+        late = self._end is not None and self.now() >= self._end
+        self.look()
+        states = self._problem.solution()
+        if self._recorder is None and self.error is None:
+            self._begin_late(states)
+        if states is not None:
+            self._record_path(states)
+            self._close(Status.SOLVED)
+        else:
+            self._close(Status.TIME_LIMIT if late else Status.ITERATION_LIMIT)
+
+    def _begin_late(self, states: list[Any] | None) -> None:
+        """Open the recording of a planner that has shown no vertex: there is a path at most."""
+        if states is None:
+            why = "the planner has no vertex, and found no path"
+            self.error = BrrtError(f"nothing to record of {self._problem.name}: {why}")
+            return
+        self._held = 0
+        try:
+            start = np.array(self._space.read(states[0])) + 0.0
+            self._recorder = self._open(start, self.now)
+        except BrrtError as error:
+            self.error = error
+        self._held = None
+
+    def _close(self, status: Status) -> None:
+        if self._recorder is not None:
+            try:
+                self._recorder.close(status)
+            except Exception as error:  # noqa: BLE001 - see `error`
+                self.error = self.error or error
+
+    @contextmanager
+    def _hooked(self) -> Iterator[None]:
+        """Let checks of motions, or of configurations, be noted."""
+        information = self._problem.planner.getSpaceInformation()
+        motions = self._problem.name not in _PARTIAL_MOTIONS
+        validator = information.getMotionValidator()
+        if type(validator) is not base.MotionValidator:
+            motions = True  # in Python anyway
+        checker = information.getStateValidityChecker()
+        if motions:
+            information.setMotionValidator(_Validator(information, validator, self))
+        else:
+            information.setStateValidityChecker(_noting(checker, self))
+        information.setup()  # setting either undoes that
+        try:
+            yield
+        finally:
+            if motions:
+                information.setMotionValidator(validator)
+            else:
+                information.setStateValidityChecker(checker)
+            information.setup()
+
+    def _condition(self, request: Any) -> Any:
+        """Return a stop condition that also follows the planner."""
+        seconds = request if isinstance(request, int | float) else None
+        if self._by_checks:
+            if seconds is not None:
+                request = base.timedPlannerTerminationCondition(float(seconds))
+            return base.plannerOrTerminationCondition(request, self._stop)
+        if seconds is not None:
+            self._end = int(1e9 * seconds)
+            return base.PlannerTerminationCondition(self._asked)
+        return base.PlannerTerminationCondition(lambda: self._asked() or request())
+
+    def _asked(self) -> bool:
+        """Count an iteration; return whether time is up."""
+        self.iteration += 1
+        now = perf_counter_ns() - self._origin
+        if now >= self._due or self.iteration >= self._due_iteration:
+            self.look()
+        return self._end is not None and now >= self._end
+
+    def checked(self, a: tuple[float, ...], b: tuple[float, ...], is_free: bool) -> None:
+        """Note a check of a motion, or of a configuration as a motion to itself."""
+        now = perf_counter_ns() - self._origin
+        self._checks += (now, self.iteration, is_free, *a, *b)
+        if self._by_checks:
+            self.iteration += 1
+            if now >= self._due or self.iteration >= self._due_iteration:
+                self.look()
+
+    def stop(self, raised: BaseException) -> bool:
+        """Return whether an exception in a check of PRM was kept, to be raised after `solve`.
+
+        It must not pass through PRM, whose other thread would then end the process.
+        """
+        if self._by_checks:
+            self._raised = raised
+            self._stop.terminate()
+        return self._by_checks
+
+    def look(self) -> None:
+        """Read the planner's data and record what has changed; the clock stands still."""
+        begin = perf_counter_ns()
+        if self.error is None:
+            try:
+                self._update(Moment(begin - self._origin, self.iteration))
+            except Exception as error:  # noqa: BLE001 - the planner goes on, see `error`
+                self.error = error
+        self._held = None
+        paused = perf_counter_ns() - begin
+        self._origin += paused
+        self._due = begin + paused - self._origin + max(_WAIT_NS, _SHARE * paused)
+        if self._exact or (self._recorder is None and self.error is None):
+            self._due = 0
+
+    def _update(self, now: Moment) -> None:
+        space = self._space
+        graph = read_graph(self._problem.planner, space)
+        self._due_iteration = self.iteration + max(len(graph.q), _FEWEST)
+        if self._recorder is None:
+            if not graph.starts:
+                return
+            start = graph.q[graph.starts[0]]
+            self._held = 0
+            self._recorder = self._open(start, self.now)
+            self._changes = Changes(space.dof, start)
+        checks, self._checks = Checks.of(self._checks, space.dof), []
+        self._held = now.t
+        columns = self._changes.update(graph, checks, now, lambda i, j: self._lengths(graph, i, j))
+        self._recorder.put(columns)
+        if now.iteration > self._recorder.iteration:
+            self._recorder.iteration = now.iteration
+
+    def _record_path(self, states: list[Any]) -> None:
+        """Record a path, unless a better one or the same was recorded."""
+        if self._recorder is None or self.error is not None:
+            return
+        rows = np.array([self._space.read(state) for state in states]) + 0.0
+        cost = self._problem.path_cost(states)
+        if cost is None:
+            cost = float(np.sqrt((np.diff(rows, axis=0) ** 2).sum(axis=1)).sum())
+        if cost < self._best * (1 - _SAME_COST):
+            self._best = cost
+            self._recorder.path(rows, cost=cost)
+
+    def _lengths(self, graph: PlannerGraph, i: Ints, j: Ints) -> Floats:
+        """Return the costs of motions between vertices, shape (n,)."""
+        cost = self._problem.cost
+        if cost is None:
+            return np.sqrt(((graph.q[i] - graph.q[j]) ** 2).sum(axis=1))
+        pairs = zip(i.tolist(), j.tolist(), strict=True)
+        return np.array([cost(graph.states[a], graph.states[b]) for a, b in pairs])
+
+
+class _Validator(base.MotionValidator):  # type: ignore[misc]
+    """Notes each motion that another validator checks."""
+
+    def __init__(self, information: Any, inner: Any, tracker: Tracker) -> None:
+        super().__init__(information)
+        self._free, self._tracker = inner.checkMotion, tracker
+        self._read = tracker._space.read
+
+    def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - OMPL's name
+        """Return whether a motion is free."""
+        try:
+            is_free: bool = self._free(a, b)
+            self._tracker.checked(self._read(a), self._read(b), is_free)
+        except BaseException as error:
+            if not self._tracker.stop(error):
+                raise
+            return False
+        return is_free
+
+
+def _noting(checker: Any, tracker: Tracker) -> Callable[[Any], bool]:
+    """Return a validity checker that notes the configurations that another one finds free."""
+    valid, read = checker.isValid, tracker._space.read
+
+    def is_valid(state: Any) -> bool:
+        found: bool = valid(state)
+        if found:
+            q = read(state)
+            tracker.checked(q, q, is_free=True)
+        return found
+
+    return is_valid
