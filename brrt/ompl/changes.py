@@ -10,15 +10,15 @@ from brrt.event_columns import CONFIGURATIONS, INTEGERS, REALS, WIDTH, EventColu
 from brrt.events import Kind, Reason
 from brrt.ompl.checks import Checks, find_last, hash_rows
 from brrt.ompl.planner_data import PlannerGraph
-from brrt.recorder.nodes import Nodes
+from brrt.ompl.tree_costs import TreeCosts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 _FIRST, _LATE, _LAST = -1, 1 << 40, 1 << 41
-"""Ranks of events of the same moment: cuts; links and rejections; removals. Those of nodes that join
-or get another parent are their depths."""
+"""Ranks of events of the same moment: cuts; links and rejections; removals. Those of nodes that
+join or get another parent are their depths."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def rise(values: Ints, above: Ints) -> Ints:
     while True:
         values, further = np.maximum(values, values[above]), above[above]
         if (further == above).all():
-            return values
+            return np.asarray(values)
         above = further
 
 
@@ -54,7 +54,7 @@ def depths(above: Ints) -> Ints:
     while True:
         depth, further = depth + depth[above], above[above]
         if (further == above).all():
-            return depth
+            return np.asarray(depth)
         above = further
 
 
@@ -110,7 +110,7 @@ class Changes:
         parent: Row of its parent, or -1, shape (k,).
         present: Whether it is there now, shape (k,).
         rows: Row of each vertex of the last graph, shape (n,).
-        trees: The nodes of both trees, for costs.
+        trees: The costs of both trees.
     """
 
     def __init__(self, dof: int, start: Floats) -> None:
@@ -120,7 +120,7 @@ class Changes:
         self.tree, self.number, self.parent, self.rows = (np.empty(0, np.int64) for _ in range(4))
         self.present = np.empty(0, np.bool_)
         self._links, self._bridges = set[tuple[int, int]](), set[tuple[int, int]]()
-        self.trees = Nodes(0), Nodes(0)
+        self.trees = TreeCosts(), TreeCosts()
         self._has_root = [False, False]
         self._last = Moment(0, 0)
 
@@ -313,22 +313,20 @@ class Changes:
             range(len(columns.kind)), columns.kind.tolist(), columns.integers.tolist(),
             columns.reals[:, 0].tolist(), strict=True,
         )  # fmt: skip
-        costs = columns.reals[:, 0]
+        costs, (joins, moves) = (
+            columns.reals[:, 0],
+            zip(*((tree.join, tree.move) for tree in self.trees), strict=True),
+        )
+        edge, rewire, vertex = int(Kind.EDGE), int(Kind.REWIRE), int(Kind.VERTEX)
         for row, kind, (first, second, third), length in events:
-            if kind == Kind.EDGE or kind == Kind.REWIRE:
-                nodes = self.trees[first]
-                total = length if third < 0 else nodes.cost[third] + length
-                if kind == Kind.EDGE:
-                    nodes.join((), third, total)
-                else:
-                    nodes.move(second, third, total)
-                costs[row] = total
-            elif kind == Kind.VERTEX:
-                self.trees[first].join_vertex(())
+            if kind == edge:
+                costs[row] = joins[first](third, length)
+            elif kind == rewire:
+                costs[row] = moves[first](second, third, length)
+            elif kind == vertex:
+                joins[first](-1, 0.0)
             elif kind == Kind.CUT:
-                self.trees[first].cut(second, third)
-            elif kind == Kind.REMOVE:
-                self.trees[first].remove(second)
+                self.trees[first].detach(second, third)
             elif kind == Kind.CONNECT:
                 costs[row] = self.trees[0].cost[first] + length + self.trees[1].cost[second]
 

@@ -57,12 +57,21 @@ class Checks:
     origin: Floats
 
     @classmethod
-    def of(cls, numbers: list[float], dof: int) -> "Checks":
-        """Read checks from their numbers: time, iteration, free, both configurations."""
-        rows = np.fromiter(numbers, np.float64, len(numbers)).reshape(-1, HEAD + 2 * dof)
+    def of(cls, noted: list[float], dof: int, origin_ns: int) -> "Checks":
+        """Read checks from their numbers.
+
+        Args:
+            noted: Of each its time, iteration, whether it is free, and both configurations, one
+                after the other.
+            dof: Numbers in a configuration.
+            origin_ns: When planning began.
+        """
+        rows = np.fromiter(noted, np.float64, len(noted)).reshape(-1, HEAD + 2 * dof)
         origin, q = rows[:, HEAD : HEAD + dof], rows[:, HEAD + dof :]
         t, iteration = rows[:, :2].T.astype(np.int64)
-        return cls(t, iteration, rows[:, 2] > 0, q, hash_rows(origin), hash_rows(q), origin)
+        return cls(
+            t - origin_ns, iteration, rows[:, 2] > 0, q, hash_rows(origin), hash_rows(q), origin
+        )
 
     def between(self, a: Hashes, b: Hashes) -> Ints:
         """Return the last check that found a motion free between configurations, either way.

@@ -8,14 +8,16 @@ from numpy.typing import NDArray
 from ompl import base
 
 from brrt.errors import BrrtError
-from brrt.ompl.planner_data import ONE_TREE, TWO_TREES
 from brrt.ompl.spaces import Space
 from brrt.scenario.claims import Claims
 
 Floats = NDArray[np.float64]
 
-_IN_TIME = ("RRT", "RRTConnect", "FMT", "BFMT")
+_IN_TIME = ("RRT", "RRTConnect")
 """Planners that never change an edge: each one has the time of its own check."""
+
+_IN_ORDER = (*_IN_TIME, "RRTstar", "InformedRRTstar", "SORRTstar", "KPIECE1", "BKPIECE1")
+"""Planners whose changes within an iteration are in the order of their checks."""
 
 _LAZY = ("LBKPIECE1",)
 """Planners that make edges before they check them."""
@@ -24,8 +26,8 @@ _LAZY = ("LBKPIECE1",)
 class Problem:
     """A planner and its problem.
 
-    The start is not here: who reads `ProblemDefinition.getStartState` frees that state (ompl 2.0.1). It
-    is the first vertex of the planner's data.
+    The start is not here: reading `ProblemDefinition.getStartState` frees that state (ompl 2.0.1).
+    The start is the first vertex of the planner's data instead.
 
     Args:
         planner: The planner, which has a problem definition.
@@ -84,6 +86,10 @@ class Problem:
             return None
         return list(self.definition.getSolutionPath().getStates())
 
+    def reaches(self, state: Any) -> bool:
+        """Return whether a state satisfies the goal."""
+        return bool(self.definition.getGoal().isSatisfied(state))
+
     def path_cost(self, states: list[Any]) -> float | None:
         """Return the cost of a path, or None for its length in the robot's metric."""
         if self.cost is None:
@@ -98,13 +104,13 @@ class Problem:
             other_metric: Whether the robot's metric may differ from the space's.
         """
         is_length = self.is_length and self.space.is_real and not other_metric
-        in_time = exact or self.name in _IN_TIME
+        in_time = self.name in (_IN_ORDER if exact else _IN_TIME)
         return Claims(
             motions="straight" if self.space.is_straight else "own",
             costs="length" if is_length else "own",
             edges="assumed" if self.name in _LAZY else "checked",
             goal_tolerance=self.tolerance if self.tolerance > 1e-12 else 0.0,
-            times="exact" if in_time and self.name in ONE_TREE + TWO_TREES else "snapshot",
+            times="exact" if in_time else "snapshot",
             samples="none",
         )
 

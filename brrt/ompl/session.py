@@ -21,6 +21,9 @@ from brrt.worlds import World
 
 Floats = NDArray[np.float64]
 
+_DEFAULT_S = 1.0
+"""How long `SimpleSetup.solve()` plans."""
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -63,11 +66,17 @@ class Session:
         kind = type(self._subject)
         self._solve = original = kind.solve
 
-        def solve(subject: Any, *request: Any) -> Any:
+        def solve(subject: Any, *request: Any, **named: Any) -> Any:
             """Plan; see the documentation of OMPL."""
             if subject is not self._subject:
-                return original(subject, *request)
-            return recorded(original, subject, request, self._next_file(), self._options)
+                return original(subject, *request, **named)
+            tracker, limit = prepare(
+                subject, (*request, *named.values()), self._next_file(), self._options
+            )
+            status = tracker.solve(lambda condition: original(subject, condition), limit)
+            if tracker.error is not None:
+                raise tracker.error
+            return status
 
         kind.solve = solve
         return self
@@ -88,38 +97,31 @@ class Session:
         return self.files[-1]
 
 
-def recorded(
-    solve: Callable[..., Any], subject: Any, request: tuple[Any, ...], path: Path, options: Options
-) -> Any:
-    """Call a `solve` and record what it does; return what it returns.
+def prepare(
+    subject: Any, request: tuple[Any, ...], path: Path, options: Options
+) -> tuple[Tracker, Any]:
+    """Return what records a `solve`, and how long that plans.
 
     Args:
-        solve: The method of the subject's class.
         subject: A setup or a planner.
-        request: Its arguments: how long to plan in s, or a stop condition.
+        request: The arguments of `solve`: how long to plan in s, or a stop condition.
         path: The file.
         options: How to record.
 
     Raises:
-        BrrtError: The problem cannot be recorded, or the file cannot be written.
+        BrrtError: The problem cannot be recorded.
     """
+    planner = subject
+    subject.setup()
     if isinstance(subject, geometric.SimpleSetup):
-        subject.setup()
         planner = subject.getPlanner()
-    else:
-        planner = subject
-        planner.setup()
     problem = Problem(planner, options.goal)
-    limit = request[0] if request else 1.0
+    limit = request[0] if request else _DEFAULT_S
 
     def open_recorder(start: Floats, clock: Callable[[], int]) -> Recorder:
         return _open(path, problem, start, limit, options, clock)
 
-    tracker = Tracker(problem, open_recorder, exact=options.exact)
-    status = tracker.solve(lambda condition: solve(subject, condition), limit)
-    if tracker.error is not None:
-        raise tracker.error
-    return status
+    return Tracker(problem, open_recorder, exact=options.exact), limit
 
 
 def _open(

@@ -9,7 +9,7 @@ from ompl import base
 from brrt.errors import BrrtError
 from brrt.robots.opaque import MOST_NUMBERS
 
-Read = Callable[[Any], tuple[float, ...]]
+Read = Callable[..., tuple[float, ...]]
 
 _STRAIGHT = (base.RealVectorStateSpace, base.SO2StateSpace, base.SE2StateSpace)
 """Spaces whose motions are straight, an angle turning the shorter way."""
@@ -27,7 +27,7 @@ class Space:
 
     Attributes:
         dof: Numbers in a configuration.
-        read: Returns the numbers of a state.
+        read: Returns the numbers of one or two states, one after the other.
         distance: Returns the distance of two states in the space's metric.
         is_real: Whether it is R^n, whose metric is Euclidean.
         is_straight: Whether its motions are straight.
@@ -60,10 +60,14 @@ def _leaves(space: Any) -> Iterator[Any]:
 
 
 def _reader(value: Callable[[Any, int], float], dof: int, is_real: bool) -> Read:
-    """Return what reads a state; it is called for each state, so the usual cases are short."""
+    """Return what reads states, which is called for each state: the usual case is short."""
     places = tuple(range(dof))
     if not is_real:
-        return lambda state: tuple([value(state, k) for k in places])
+        return lambda *states: tuple([value(state, k) for state in states for k in places])
     if dof == 2:
-        return lambda state: (state[0], state[1])
-    return lambda state: tuple([state[k] for k in places])
+        return _read_plane
+    return lambda *states: tuple([state[k] for state in states for k in places])
+
+
+def _read_plane(a: Any, b: Any = None) -> tuple[float, ...]:
+    return (a[0], a[1]) if b is None else (a[0], a[1], b[0], b[1])

@@ -1,9 +1,11 @@
 """Follows an OMPL planner while it plans, by its checks of motions and its stop condition.
 
-Three hooks of ompl 2.0.1 work in Python: a `MotionValidator`, which sees each motion that is checked; a
-`PlannerTerminationCondition`, which is asked in each iteration; and `getPlannerData` within it.
+Three hooks of ompl 2.0.1 work in Python: a `MotionValidator`, which sees each motion that is
+checked; a `PlannerTerminationCondition`, which is asked in each iteration; and `getPlannerData`
+within it.
 """
 
+import gc
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,7 +20,7 @@ from brrt.errors import BrrtError
 from brrt.events import Status
 from brrt.ompl.changes import Changes, Moment
 from brrt.ompl.checks import Checks
-from brrt.ompl.planner_data import GRAPHS, PlannerGraph, read_graph
+from brrt.ompl.planner_data import GRAPHS, ONE_TREE, PlannerGraph, read_graph
 from brrt.ompl.problem import Problem
 from brrt.recorder.recorder import Recorder
 
@@ -52,6 +54,9 @@ class Tracker:
 
     Attributes:
         iteration: How often the planner has asked whether to stop; for PRM, its checks.
+        read: Returns the numbers of one or two states.
+        checks: What was checked since the planner's data were read; see `Checks.of`.
+        by_checks: Whether checks of motions are followed instead of the stop condition.
         error: What went wrong in the recorder: nothing is recorded any more then.
     """
 
@@ -63,11 +68,13 @@ class Tracker:
         exact: bool,
     ) -> None:
         self._problem, self._space, self._exact = problem, problem.space, exact
-        self._open, self._recorder = open_recorder, None
+        self._open = open_recorder
+        self._recorder: Recorder | None = None
+        self.read = problem.space.read
         self._changes: Changes
         self.iteration = 0
         self.error: Exception | None = None
-        self._checks: list[float] = []
+        self.checks: list[float] = []
         self._origin = perf_counter_ns()
         self._held: int | None = None
         self._end: int | None = None
@@ -75,7 +82,7 @@ class Tracker:
         self._best = math.inf
         # PRM asks its condition on a thread of its own, while `solve` holds Python's lock: a
         # condition in Python would wait forever. There checks of motions are followed alone.
-        self._by_checks = problem.name in GRAPHS
+        self.by_checks = problem.name in GRAPHS
         self._stop = base.plannerNonTerminatingCondition()
         self._raised: BaseException | None = None
 
@@ -94,13 +101,16 @@ class Tracker:
         try:
             with self._hooked():
                 status = solve(self._condition(request))
-            if self._raised is not None:
-                raise self._raised
+            self._raise_kept()
         except BaseException:
             self._close(Status.INTERRUPTED)
             raise
         self._finish()
         return status
+
+    def _raise_kept(self) -> None:
+        if self._raised is not None:
+            raise self._raised
 
     def _finish(self) -> None:
         """Record the rest and close the recording."""
@@ -123,7 +133,7 @@ class Tracker:
             return
         self._held = 0
         try:
-            start = np.array(self._space.read(states[0])) + 0.0
+            start = np.array(self.read(states[0])) + 0.0
             self._recorder = self._open(start, self.now)
         except BrrtError as error:
             self.error = error
@@ -146,7 +156,7 @@ class Tracker:
             motions = True  # in Python anyway
         checker = information.getStateValidityChecker()
         if motions:
-            information.setMotionValidator(_Validator(information, validator, self))
+            information.setMotionValidator(_validator(information, validator, self))
         else:
             information.setStateValidityChecker(_noting(checker, self))
         information.setup()  # setting either undoes that
@@ -162,16 +172,16 @@ class Tracker:
     def _condition(self, request: Any) -> Any:
         """Return a stop condition that also follows the planner."""
         seconds = request if isinstance(request, int | float) else None
-        if self._by_checks:
+        if self.by_checks:
             if seconds is not None:
                 request = base.timedPlannerTerminationCondition(float(seconds))
             return base.plannerOrTerminationCondition(request, self._stop)
         if seconds is not None:
             self._end = int(1e9 * seconds)
-            return base.PlannerTerminationCondition(self._asked)
-        return base.PlannerTerminationCondition(lambda: self._asked() or request())
+            return base.PlannerTerminationCondition(self.asked)
+        return base.PlannerTerminationCondition(lambda: self.asked() or request())
 
-    def _asked(self) -> bool:
+    def asked(self) -> bool:
         """Count an iteration; return whether time is up."""
         self.iteration += 1
         now = perf_counter_ns() - self._origin
@@ -179,33 +189,26 @@ class Tracker:
             self.look()
         return self._end is not None and now >= self._end
 
-    def checked(self, a: tuple[float, ...], b: tuple[float, ...], is_free: bool) -> None:
-        """Note a check of a motion, or of a configuration as a motion to itself."""
-        now = perf_counter_ns() - self._origin
-        self._checks += (now, self.iteration, is_free, *a, *b)
-        if self._by_checks:
-            self.iteration += 1
-            if now >= self._due or self.iteration >= self._due_iteration:
-                self.look()
-
-    def stop(self, raised: BaseException) -> bool:
-        """Return whether an exception in a check of PRM was kept, to be raised after `solve`.
+    def stop(self, raised: BaseException) -> None:
+        """Stop PRM, and keep an exception until its `solve` has ended.
 
         It must not pass through PRM, whose other thread would then end the process.
         """
-        if self._by_checks:
-            self._raised = raised
-            self._stop.terminate()
-        return self._by_checks
+        self._raised = raised
+        self._stop.terminate()
 
     def look(self) -> None:
         """Read the planner's data and record what has changed; the clock stands still."""
         begin = perf_counter_ns()
         if self.error is None:
+            collects = gc.isenabled()
+            gc.disable()  # of many small lists that go at once
             try:
                 self._update(Moment(begin - self._origin, self.iteration))
             except Exception as error:  # noqa: BLE001 - the planner goes on, see `error`
                 self.error = error
+            if collects:
+                gc.enable()
         self._held = None
         paused = perf_counter_ns() - begin
         self._origin += paused
@@ -224,18 +227,30 @@ class Tracker:
             self._held = 0
             self._recorder = self._open(start, self.now)
             self._changes = Changes(space.dof, start)
-        checks, self._checks = Checks.of(self._checks, space.dof), []
+        checks = Checks.of(self.checks, space.dof, self._origin)
+        self.checks.clear()
         self._held = now.t
         columns = self._changes.update(graph, checks, now, lambda i, j: self._lengths(graph, i, j))
         self._recorder.put(columns)
-        if now.iteration > self._recorder.iteration:
-            self._recorder.iteration = now.iteration
+        self._recorder.iteration = now.iteration
+        self._improve(graph)
+
+    def _improve(self, graph: PlannerGraph) -> None:
+        """Record the best path so far of a planner that goes on after the first."""
+        planner = self._problem.planner
+        if self._problem.name not in ONE_TREE or not hasattr(planner, "bestCost"):
+            return
+        if planner.bestCost().value() < self._best * (1 - _SAME_COST):
+            for goal in filter(lambda i: self._problem.reaches(graph.states[i]), graph.goals):
+                path = graph.path_to(goal)
+                if path[0] in graph.starts:
+                    self._record_path([graph.states[i] for i in path])
 
     def _record_path(self, states: list[Any]) -> None:
         """Record a path, unless a better one or the same was recorded."""
         if self._recorder is None or self.error is not None:
             return
-        rows = np.array([self._space.read(state) for state in states]) + 0.0
+        rows = np.array([self.read(state) for state in states]) + 0.0
         cost = self._problem.path_cost(states)
         if cost is None:
             cost = float(np.sqrt((np.diff(rows, axis=0) ** 2).sum(axis=1)).sum())
@@ -247,40 +262,49 @@ class Tracker:
         """Return the costs of motions between vertices, shape (n,)."""
         cost = self._problem.cost
         if cost is None:
-            return np.sqrt(((graph.q[i] - graph.q[j]) ** 2).sum(axis=1))
+            return np.asarray(np.sqrt(((graph.q[i] - graph.q[j]) ** 2).sum(axis=1)))
         pairs = zip(i.tolist(), j.tolist(), strict=True)
         return np.array([cost(graph.states[a], graph.states[b]) for a, b in pairs])
 
 
-class _Validator(base.MotionValidator):  # type: ignore[misc]
-    """Notes each motion that another validator checks."""
+def _validator(information: Any, inner: Any, tracker: Tracker) -> Any:
+    """Return a validator that notes each motion that another one checks."""
+    free, read, note = inner.checkMotion, tracker.read, tracker.checks.extend
+    by_checks = tracker.by_checks
 
-    def __init__(self, information: Any, inner: Any, tracker: Tracker) -> None:
-        super().__init__(information)
-        self._free, self._tracker = inner.checkMotion, tracker
-        self._read = tracker._space.read
+    class Validator(base.MotionValidator):  # type: ignore[misc]
+        """Notes motions."""
 
-    def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - OMPL's name
-        """Return whether a motion is free."""
-        try:
-            is_free: bool = self._free(a, b)
-            self._tracker.checked(self._read(a), self._read(b), is_free)
-        except BaseException as error:
-            if not self._tracker.stop(error):
-                raise
-            return False
-        return is_free
+        def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - OMPL's name
+            """Return whether a motion is free."""
+            is_free: bool = free(a, b)
+            note((perf_counter_ns(), tracker.iteration, is_free, *read(a, b)))
+            return is_free
+
+    class CountingValidator(Validator):
+        """Notes motions of a planner whose stop condition is not followed."""
+
+        def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - OMPL's name
+            """Return whether a motion is free."""
+            try:
+                is_free: bool = super().checkMotion(a, b)
+                tracker.asked()
+            except BaseException as error:  # noqa: BLE001 - raised after `solve`
+                tracker.stop(error)
+                return False
+            return is_free
+
+    return (CountingValidator if by_checks else Validator)(information)
 
 
 def _noting(checker: Any, tracker: Tracker) -> Callable[[Any], bool]:
     """Return a validity checker that notes the configurations that another one finds free."""
-    valid, read = checker.isValid, tracker._space.read
+    valid, read, note = checker.isValid, tracker.read, tracker.checks.extend
 
     def is_valid(state: Any) -> bool:
         found: bool = valid(state)
         if found:
-            q = read(state)
-            tracker.checked(q, q, is_free=True)
+            note((perf_counter_ns(), tracker.iteration, True, *read(state, state)))
         return found
 
     return is_valid
