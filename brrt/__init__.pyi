@@ -1,3 +1,4 @@
+from brrt import ompl as ompl
 from brrt.comparison.comparison import compare as compare
 from brrt.comparison.difference import Difference as Difference
 from brrt.comparison.events import first_difference as first_difference

@@ -1,6 +1,7 @@
 """The adapter of `brrt record`: an unchanged script that plans with OMPL becomes recordings."""
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from brrt.errors import BrrtError
@@ -15,13 +16,13 @@ class OmplAdapter:
         Args:
             solves: Names the files, and takes errors that the script must not notice.
         """
-        from brrt.recorder.adapters.imports import when_imported  # noqa: PLC0415
-
+        when_imported = import_module("brrt.recorder.adapters.imports").when_imported
         hooked: list[tuple[Any, Any]] = []
 
         def hook(module: Any) -> None:
-            for kind in vars(module).values():
-                if isinstance(kind, type) and "solve" in vars(kind):
+            classes: list[Any] = [each for each in vars(module).values() if isinstance(each, type)]
+            for kind in classes:
+                if "solve" in vars(kind):
                     hooked.append((kind, kind.solve))
                     kind.solve = _recording(kind.solve, solves)
 
@@ -46,7 +47,9 @@ def _recording(original: Callable[..., Any], solves: Any) -> Callable[..., Any]:
         name = f"{type(subject).__name__}.solve"
         arguments = (*request, *named.values())
         try:
-            tracker, limit = prepare(subject, arguments, solves.next_file(), Options())
+            tracker, limit = prepare(
+                subject, arguments, solves.next_file(), Options(), must_record=False
+            )
         except BrrtError as error:
             solves.failed(name, error)
             return original(subject, *request, **named)

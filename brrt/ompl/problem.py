@@ -9,6 +9,7 @@ from ompl import base
 
 from brrt.errors import BrrtError
 from brrt.ompl.spaces import Space
+from brrt.robots import Robot
 from brrt.scenario.claims import Claims
 
 Floats = NDArray[np.float64]
@@ -18,6 +19,9 @@ _IN_TIME = ("RRT", "RRTConnect")
 
 _IN_ORDER = (*_IN_TIME, "RRTstar", "InformedRRTstar", "SORRTstar", "KPIECE1", "BKPIECE1")
 """Planners whose changes within an iteration are in the order of their checks."""
+
+_EQUAL = 1e-12
+"""Tolerance of a goal that is a single state."""
 
 _LAZY = ("LBKPIECE1",)
 """Planners that make edges before they check them."""
@@ -96,23 +100,36 @@ class Problem:
             return None
         return float(sum(map(self.cost, states[:-1], states[1:])))
 
-    def claims(self, *, exact: bool, other_metric: bool) -> Claims:
+    def claims(self, robot: Robot | None, *, exact: bool) -> Claims:
         """Return how a log of this planner is made.
 
         Args:
+            robot: What moves; None for a point, or a robot that is not known.
             exact: Whether the planner's data are read in each iteration.
-            other_metric: Whether the robot's metric may differ from the space's.
         """
-        is_length = self.is_length and self.space.is_real and not other_metric
+        is_length = self.is_length and self.space.is_real
         in_time = self.name in (_IN_ORDER if exact else _IN_TIME)
         return Claims(
             motions="straight" if self.space.is_straight else "own",
             costs="length" if is_length else "own",
             edges="assumed" if self.name in _LAZY else "checked",
-            goal_tolerance=self.tolerance if self.tolerance > 1e-12 else 0.0,
+            goal_tolerance=self._tolerance(robot),
             times="exact" if in_time else "snapshot",
             samples="none",
         )
+
+    def _tolerance(self, robot: Robot | None) -> float:
+        """Return how far from the goal paths may end, in the robot's metric."""
+        if self.tolerance <= _EQUAL:
+            return 0.0
+        if self.space.is_real:
+            return self.tolerance
+        extent = self.planner.getSpaceInformation().getMaximumExtent()
+        wraps = robot is not None and not robot.opaque
+        spread = self.space.spread(self.goal, self.tolerance, extent, wraps=wraps)
+        if robot is None:
+            return float(np.sqrt(spread @ spread))
+        return float(robot.distance(np.zeros(len(spread)), spread))
 
     @property
     def params(self) -> dict[str, Any]:

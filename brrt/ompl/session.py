@@ -15,7 +15,7 @@ from brrt.ompl.problem import Problem
 from brrt.ompl.tracker import Tracker
 from brrt.recorder.record import record
 from brrt.recorder.recorder import Recorder
-from brrt.robots import Robot
+from brrt.robots import Robot, make_robot
 from brrt.scenario.claims import Claims
 from brrt.worlds import World
 
@@ -98,7 +98,12 @@ class Session:
 
 
 def prepare(
-    subject: Any, request: tuple[Any, ...], path: Path, options: Options
+    subject: Any,
+    request: tuple[Any, ...],
+    path: Path,
+    options: Options,
+    *,
+    must_record: bool = True,
 ) -> tuple[Tracker, Any]:
     """Return what records a `solve`, and how long that plans.
 
@@ -107,6 +112,7 @@ def prepare(
         request: The arguments of `solve`: how long to plan in s, or a stop condition.
         path: The file.
         options: How to record.
+        must_record: Whether planning ends where the recorder fails.
 
     Raises:
         BrrtError: The problem cannot be recorded.
@@ -121,7 +127,8 @@ def prepare(
     def open_recorder(start: Floats, clock: Callable[[], int]) -> Recorder:
         return _open(path, problem, start, limit, options, clock)
 
-    return Tracker(problem, open_recorder, exact=options.exact), limit
+    tracker = Tracker(problem, open_recorder, exact=options.exact, must_record=must_record)
+    return tracker, limit
 
 
 def _open(
@@ -129,14 +136,16 @@ def _open(
     clock: Callable[[], int],
 ) -> Recorder:  # fmt: skip
     """Open the recording of a problem."""
-    other_metric = options.robot is not None and not problem.space.is_real
-    claims = problem.claims(exact=options.exact, other_metric=other_metric)
+    robot = options.robot
+    if robot is not None and not isinstance(robot, Robot):
+        robot = make_robot(str(robot))
+    claims = problem.claims(robot, exact=options.exact)
     if options.claims is not None:
         claims = Claims.of(claims.stated() | Claims.of(options.claims).stated())
     return record(
         path,
-        world=options.world, robot=options.robot, start=start, goal=problem.goal,
-        dof=problem.space.dof if options.robot is None else None,
+        world=options.world, robot=robot, start=start, goal=problem.goal,
+        dof=problem.space.dof if robot is None else None,
         planner=f"ompl:{problem.name}", params=problem.params, seed=options.seed,
         time_limit=float(limit) if isinstance(limit, int | float) else None,
         claims=claims, clock=clock,

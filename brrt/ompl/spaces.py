@@ -1,17 +1,21 @@
 """State spaces of OMPL: how a state becomes the numbers of a configuration."""
 
+import math
 from collections.abc import Callable, Iterator
 from itertools import takewhile
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from ompl import base
 
 from brrt.errors import BrrtError
 from brrt.robots.opaque import MOST_NUMBERS
 
+Floats = NDArray[np.float64]
 Read = Callable[..., tuple[float, ...]]
 
-_STRAIGHT = (base.RealVectorStateSpace, base.SO2StateSpace, base.SE2StateSpace)
+_STRAIGHT = (base.RealVectorStateSpace, base.SO2StateSpace)
 """Spaces whose motions are straight, an angle turning the shorter way."""
 
 
@@ -46,17 +50,39 @@ class Space:
             raise BrrtError(f"states of the space {space.getName()} have {count} numbers")
         self.distance: Callable[[Any, Any], float] = information.distance
         self.is_real = type(space) is base.RealVectorStateSpace
-        self.is_straight = all(type(leaf) in _STRAIGHT for leaf in _leaves(space))
+        self._leaves = list(_leaves(space, 1.0))
+        self.is_straight = all(type(leaf) in _STRAIGHT for leaf, _ in self._leaves)
         self.read: Read = _reader(value, self.dof, self.is_real)
 
+    def spread(self, q: Floats, far: float, extent: float, *, wraps: bool) -> Floats:
+        """Return how far each number may be from that of a configuration within a distance.
 
-def _leaves(space: Any) -> Iterator[Any]:
-    """Yield the spaces that a compound one is made of."""
-    if type(space) is base.CompoundStateSpace:
+        Args:
+            q: The configuration, shape (dof,).
+            far: The distance, in the space's metric.
+            extent: The longest distance of the space, for spaces that are not known.
+            wraps: Whether who compares numbers knows that angles wrap.
+        """
+        limits: list[float] = []
+        for leaf, weight in self._leaves:
+            most = far / weight if weight > 0 else extent
+            if type(leaf) is base.RealVectorStateSpace:
+                limits += [most] * leaf.getDimension()
+            elif type(leaf) is base.SO2StateSpace:
+                crosses = abs(float(q[len(limits)])) + most >= math.pi and not wraps
+                limits.append(2 * math.pi if crosses else min(most, math.pi))
+            else:
+                return np.full(self.dof, extent + 2 * math.pi)
+        return np.array(limits)
+
+
+def _leaves(space: Any, weight: float) -> Iterator[tuple[Any, float]]:
+    """Yield the spaces that a compound one is made of, and their weights in its metric."""
+    if type(space) in (base.CompoundStateSpace, base.SE2StateSpace):
         for i in range(space.getSubspaceCount()):
-            yield from _leaves(space.getSubspace(i))
+            yield from _leaves(space.getSubspace(i), weight * space.getSubspaceWeight(i))
     else:
-        yield space
+        yield space, weight
 
 
 def _reader(value: Callable[[Any, int], float], dof: int, is_real: bool) -> Read:

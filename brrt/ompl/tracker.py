@@ -51,6 +51,7 @@ class Tracker:
         problem: The planner and its problem.
         open_recorder: Opens the recording, given the start configuration and a clock.
         exact: Whether to read the planner's data in each iteration.
+        must_record: Whether planning ends where the recorder fails.
 
     Attributes:
         iteration: How often the planner has asked whether to stop; for PRM, its checks.
@@ -66,6 +67,7 @@ class Tracker:
         open_recorder: Callable[[Floats, Callable[[], int]], Recorder],
         *,
         exact: bool,
+        must_record: bool,
     ) -> None:
         self._problem, self._space, self._exact = problem, problem.space, exact
         self._open = open_recorder
@@ -79,6 +81,7 @@ class Tracker:
         self._held: int | None = None
         self._end: int | None = None
         self._due, self._due_iteration = 0, 0
+        self._must_record, self._failed = must_record, False
         self._best = math.inf
         # PRM asks its condition on a thread of its own, while `solve` holds Python's lock: a
         # condition in Python would wait forever. There checks of motions are followed alone.
@@ -187,7 +190,7 @@ class Tracker:
         now = perf_counter_ns() - self._origin
         if now >= self._due or self.iteration >= self._due_iteration:
             self.look()
-        return self._end is not None and now >= self._end
+        return self._failed or (self._end is not None and now >= self._end)
 
     def stop(self, raised: BaseException) -> None:
         """Stop PRM, and keep an exception until its `solve` has ended.
@@ -207,6 +210,7 @@ class Tracker:
                 self._update(Moment(begin - self._origin, self.iteration))
             except Exception as error:  # noqa: BLE001 - the planner goes on, see `error`
                 self.error = error
+                self._fail()
             if collects:
                 gc.enable()
         self._held = None
@@ -215,6 +219,12 @@ class Tracker:
         self._due = begin + paused - self._origin + max(_WAIT_NS, _SHARE * paused)
         if self._exact or (self._recorder is None and self.error is None):
             self._due = 0
+
+    def _fail(self) -> None:
+        """End planning if it must be recorded."""
+        if self._must_record:
+            self._failed = True
+            self._stop.terminate()
 
     def _update(self, now: Moment) -> None:
         space = self._space

@@ -1,0 +1,1 @@
+"""Tests of recording OMPL; they are skipped where ompl is not installed."""
