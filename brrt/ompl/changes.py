@@ -342,7 +342,6 @@ def _occurrences(keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def _iterations(t: Ints, checks: Checks, now: Moment) -> Ints:
-    """Return the iteration of each time, shape (n,)."""
-    at = np.searchsorted(checks.t, t, side="right") - 1
-    known = (at >= 0) & (t < now.t)
-    return np.where(known, checks.iteration[at] if len(checks.t) else 0, now.iteration)
+    """Return the iteration of each time since the last graph was read, shape (n,)."""
+    times, counts = np.append(checks.t, now.t), np.append(checks.iteration, now.iteration)
+    return np.asarray(counts[np.minimum(np.searchsorted(times, t), len(checks.t))])

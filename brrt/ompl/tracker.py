@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 _WAIT_NS = 250_000_000
 """How long the planner's data are not read, at most."""
 
-_SHARE = 10
+_SHARE = 20
 """Reading takes at most one part in so many of the time, whatever the size of the tree."""
 
 _SAME_COST = 1e-9

@@ -66,6 +66,8 @@ def point_setup(
     made = getattr(geometric, planner)(information)
     if hasattr(made, "setRange"):
         made.setRange(step)
+    if hasattr(made, "setNumSamples"):
+        made.setNumSamples(300)
     setup.setPlanner(made)
     return setup
 
