@@ -1,13 +1,23 @@
 """What changed between two looks at a planner's data, as events in a possible order."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brrt.event_columns import CONFIGURATIONS, INTEGERS, REALS, WIDTH, EventColumns
+from brrt.event_columns import EventColumns
 from brrt.events import Kind, Reason
+from brrt.ompl.batch import (
+    FIRST,
+    LAST,
+    LATE,
+    Batch,
+    Moment,
+    depths,
+    iterations_at,
+    occurrences,
+    rise,
+)
 from brrt.ompl.checks import Checks, find_last, hash_rows
 from brrt.ompl.planner_data import PlannerGraph
 from brrt.ompl.tree_costs import TreeCosts
@@ -15,82 +25,6 @@ from brrt.ompl.tree_costs import TreeCosts
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-
-_FIRST, _LATE, _LAST = -1, 1 << 40, 1 << 41
-"""Ranks of events of the same moment: cuts; links and rejections; removals. Those of nodes that
-join or get another parent are their depths."""
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """When the planner's data were read.
-
-    Attributes:
-        t: Time in ns since the run began.
-        iteration: The planner's iteration.
-    """
-
-    t: int
-    iteration: int
-
-
-def rise(values: Ints, above: Ints) -> Ints:
-    """Return the greatest value of each row and of those above it, shape (n,).
-
-    Args:
-        values: A value of each row, shape (n,).
-        above: The row above each row, itself at the top, shape (n,).
-    """
-    while True:
-        values, further = np.maximum(values, values[above]), above[above]
-        if (further == above).all():
-            return np.asarray(values)
-        above = further
-
-
-def depths(above: Ints) -> Ints:
-    """Return how many rows are above each row, shape (n,); see `rise`."""
-    depth = (above != np.arange(len(above))).astype(np.int64)
-    while True:
-        depth, further = depth + depth[above], above[above]
-        if (further == above).all():
-            return np.asarray(depth)
-        above = further
-
-
-class _Batch:
-    """Events in the making."""
-
-    def __init__(self, dof: int) -> None:
-        self._dof, self._parts = dof, list[tuple[NDArray[np.generic], ...]]()
-
-    def add(
-        self, kind: Kind | Ints, t: Ints, iteration: Ints, rank: Ints | int, *integers: Ints | int,
-        real: Floats | float = 0.0, q: Floats | None = None,
-    ) -> None:  # fmt: skip
-        """Add events; the integers in the order of `brrt.events.FIELDS`."""
-        n = len(t)
-        whole, reals = np.zeros((n, WIDTH[INTEGERS]), np.int32), np.zeros((n, WIDTH[REALS]))
-        for column, values in enumerate(integers):
-            whole[:, column] = values
-        reals[:, 0] = real
-        rows = np.zeros((n, WIDTH[CONFIGURATIONS] * self._dof)) if q is None else q
-        kinds = np.broadcast_to(np.asarray(kind, np.uint8), n)
-        self._parts.append((t, iteration, np.broadcast_to(rank, n), kinds, whole, reals, rows))
-
-    def columns(self, last: Moment) -> EventColumns:
-        """Return the events in order, none before the last moment."""
-        t, iteration, rank, kind, whole, reals, q = (
-            np.concatenate(parts) for parts in zip(*self._parts, strict=True)
-        )
-        order = np.lexsort((rank, t))
-        steps = np.arange(len(order))
-        t = np.maximum.accumulate(np.maximum(t[order] - steps, last.t + 1)) + steps
-        iteration = np.maximum.accumulate(np.maximum(iteration[order], last.iteration))
-        return EventColumns(
-            0, self._dof, kind[order], t, iteration, whole[order], reals[order], q[order],
-            np.empty((0, self._dof)),
-        )  # fmt: skip
 
 
 class Changes:
@@ -146,15 +80,15 @@ class Changes:
         parent = np.full(len(self.q), -1)
         has_parent = graph.parent >= 0
         parent[self.rows[has_parent]] = self.rows[graph.parent[has_parent]]
-        batch = _Batch(self._dof)
+        batch = Batch(self._dof)
         there = index >= 0
         self._cut(batch, parent, there, known)
         self._grow(batch, parent, index, checks, now, known, length)
-        self._join(batch, graph, there, checks, now, length)
+        self._join(batch, graph, parent, there, checks, now, length)
         self._reject(batch, checks)
         gone = np.flatnonzero(self.present & ~there)
         batch.add(
-            Kind.REMOVE, np.full(len(gone), now.t), np.full(len(gone), now.iteration), _LAST,
+            Kind.REMOVE, np.full(len(gone), now.t), np.full(len(gone), now.iteration), LAST,
             self.tree[gone], self.number[gone],
         )  # fmt: skip
         self.parent, self.present = parent, there
@@ -168,7 +102,7 @@ class Changes:
         """Find the row of each vertex; append those that are new."""
         hashes = hash_rows(graph.q)
         keys = hashes ^ (graph.tree.astype(np.uint64) << np.uint64(63))
-        keys += _occurrences(keys)
+        keys += occurrences(keys)
         present = np.flatnonzero(self.present)
         found = find_last(self._key[present], keys)
         self.rows = np.where(found >= 0, present[found] if len(present) else -1, -1)
@@ -182,21 +116,20 @@ class Changes:
         ):  # fmt: skip
             setattr(self, name, np.concatenate([getattr(self, name), values]))
 
-    def _cut(self, batch: _Batch, parent: Ints, there: Flags, known: int) -> None:
+    def _cut(self, batch: Batch, parent: Ints, there: Flags, known: int) -> None:
         """Add the edges to parents that are gone; first of all, or others would make circles."""
         lost = there[:known] & (self.parent[:known] >= 0) & (parent[:known] < 0)
         rows = np.flatnonzero(lost)
-        first, iteration = (
-            np.full(len(rows), self._last.t),
-            np.full(len(rows), self._last.iteration),
-        )
+        ends = np.sort(np.stack([rows, self.parent[rows]], axis=1), axis=1)
+        self._links -= set(map(tuple, ends.tolist()))  # a cut takes away a link as well
+        first, iteration = (np.full(len(rows), x) for x in (self._last.t, self._last.iteration))
         batch.add(
-            Kind.CUT, first, iteration, _FIRST,
+            Kind.CUT, first, iteration, FIRST,
             self.tree[rows], self.number[rows], self.number[self.parent[rows]],
         )  # fmt: skip
 
     def _grow(
-        self, batch: _Batch, parent: Ints, index: Ints, checks: Checks, now: Moment, known: int,
+        self, batch: Batch, parent: Ints, index: Ints, checks: Checks, now: Moment, known: int,
         length: Callable[[Ints, Ints], Floats],
     ) -> None:  # fmt: skip
         """Add the nodes that joined, and those that have another parent."""
@@ -228,7 +161,7 @@ class Changes:
         kind = np.where(joins, int(Kind.EDGE), int(Kind.REWIRE))
         kind[joins & (up < 0) & ~np.isin(changed, roots)] = int(Kind.VERTEX)
         batch.add(
-            kind, t, _iterations(t, checks, now), depth[changed], self.tree[changed],
+            kind, t, iterations_at(t, checks, now), depth[changed], self.tree[changed],
             self.number[changed], np.where(inner, self.number[up], -1), real=lengths,
             q=self.q[changed] * (kind != Kind.REWIRE)[:, None],
         )  # fmt: skip
@@ -263,8 +196,8 @@ class Changes:
             self.number[own] = len(nodes) + np.arange(len(own))
 
     def _join(
-        self, batch: _Batch, graph: PlannerGraph, there: Flags, checks: Checks, now: Moment,
-        length: Callable[[Ints, Ints], Floats],
+        self, batch: Batch, graph: PlannerGraph, parent: Ints, there: Flags, checks: Checks,
+        now: Moment, length: Callable[[Ints, Ints], Floats],
     ) -> None:  # fmt: skip
         """Add edges beside those to parents, and take away those that are gone."""
         pairs = np.sort(self.rows[graph.links], axis=1)
@@ -284,14 +217,20 @@ class Changes:
             integers = [self.number[a], self.number[b]]
             if kind is Kind.LINK:
                 integers.insert(0, self.tree[a])
-            batch.add(kind, t, _iterations(t, checks, now), _LATE, *integers, real=length(i, j))
-        lost = [pair for pair in self._links if pair not in links and there[list(pair)].all()]
+            batch.add(kind, t, iterations_at(t, checks, now), LATE, *integers, real=length(i, j))
+        # A cut takes away the edge to a parent as well: a link of such a pair stays.
+        kept = {(a, b) for a, b in self._links if parent[a] == b or parent[b] == a}
+        lost = [
+            pair
+            for pair in self._links
+            if pair not in links and pair not in kept and there[list(pair)].all()
+        ]
         a, b = np.array(lost, np.int64).reshape(-1, 2).T
         when = np.full(len(a), now.t), np.full(len(a), now.iteration)
-        batch.add(Kind.CUT, *when, _LATE, self.tree[a], self.number[a], self.number[b])
-        self._links, self._bridges = set(links), set(bridges)
+        batch.add(Kind.CUT, *when, LATE, self.tree[a], self.number[a], self.number[b])
+        self._links, self._bridges = kept.union(links), set(bridges)
 
-    def _reject(self, batch: _Batch, checks: Checks) -> None:
+    def _reject(self, batch: Batch, checks: Checks) -> None:
         """Add motions that are not free, as far as a node is at one end."""
         blocked = np.flatnonzero(~checks.is_free)
         alive = np.flatnonzero(self._birth >= 0)
@@ -303,7 +242,7 @@ class Changes:
         rows, blocked, target = alive[at[at >= 0]], blocked[at >= 0], target[at >= 0]
         t = np.maximum(checks.t[blocked], self._birth[rows])
         batch.add(
-            Kind.REJECT, t, checks.iteration[blocked], _LATE, self.tree[rows], self.number[rows],
+            Kind.REJECT, t, checks.iteration[blocked], LATE, self.tree[rows], self.number[rows],
             int(Reason.COLLISION), q=target,
         )  # fmt: skip
 
@@ -329,19 +268,3 @@ class Changes:
                 self.trees[first].detach(second, third)
             elif kind == Kind.CONNECT:
                 costs[row] = self.trees[0].cost[first] + length + self.trees[1].cost[second]
-
-
-def _occurrences(keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return how many earlier rows have the same key, shape (n,)."""
-    order = np.argsort(keys, kind="stable")
-    ordered, steps = keys[order], np.arange(len(keys))
-    begins = np.append(True, ordered[1:] != ordered[:-1])[: len(keys)]
-    count = np.empty(len(keys), np.uint64)
-    count[order] = steps - np.maximum.accumulate(np.where(begins, steps, 0))
-    return count
-
-
-def _iterations(t: Ints, checks: Checks, now: Moment) -> Ints:
-    """Return the iteration of each time since the last graph was read, shape (n,)."""
-    times, counts = np.append(checks.t, now.t), np.append(checks.iteration, now.iteration)
-    return np.asarray(counts[np.minimum(np.searchsorted(times, t), len(checks.t))])

@@ -18,7 +18,8 @@ from ompl import base
 
 from brrt.errors import BrrtError
 from brrt.events import Status
-from brrt.ompl.changes import Changes, Moment
+from brrt.ompl.batch import Moment
+from brrt.ompl.changes import Changes
 from brrt.ompl.checks import Checks
 from brrt.ompl.planner_data import GRAPHS, ONE_TREE, PlannerGraph, read_graph
 from brrt.ompl.problem import Problem
