@@ -1,55 +1,53 @@
 """The adapter of `brrt record`: an unchanged script that plans with OMPL becomes recordings."""
 
 from collections.abc import Callable
-from importlib import import_module
+from functools import wraps
+from types import ModuleType
 from typing import Any
 
 from brrt.errors import BrrtError
+from brrt.recorder.adapters import Adapter, Solves, when_imported
 
 
-class OmplAdapter:
-    """OMPL's planners: each SimpleSetup.solve and Planner.solve is a recording."""
+class OmplAdapter(Adapter):
+    """OMPL's planners: each SimpleSetup.solve and Planner.solve.
 
-    def install(self, solves: Any) -> Callable[[], None]:
-        """Hook into OMPL once the script has imported it; return what takes the hooks out.
+    Nothing is known of the script's obstacles, so nothing is said of collisions.
+    """
 
-        Args:
-            solves: Names the files, and takes errors that the script must not notice.
-        """
-        when_imported = import_module("brrt.recorder.adapters.imports").when_imported
+    def install(self, solves: Solves) -> Callable[[], None]:
+        """See `Adapter.install`."""
         hooked: list[tuple[Any, Any]] = []
 
-        def hook(module: Any) -> None:
-            classes: list[Any] = [each for each in vars(module).values() if isinstance(each, type)]
-            for kind in classes:
-                if "solve" in vars(kind):
-                    hooked.append((kind, kind.solve))
-                    kind.solve = _recording(kind.solve, solves)
+        def hook(module: ModuleType) -> None:
+            for kind in list(vars(module).values()):
+                if isinstance(kind, type) and "solve" in vars(kind):
+                    solve = vars(kind)["solve"]
+                    hooked.append((kind, solve))
+                    kind.solve = _recording(solve, solves)  # type: ignore[attr-defined]
 
-        forget = when_imported("ompl.geometric", hook)
+        end = when_imported("ompl.geometric", hook)
 
         def undo() -> None:
-            forget()
+            end()
             for kind, solve in hooked:
                 kind.solve = solve
-            hooked.clear()
 
         return undo
 
 
-def _recording(original: Callable[..., Any], solves: Any) -> Callable[..., Any]:
+def _recording(original: Callable[..., Any], solves: Solves) -> Callable[..., Any]:
     """Return a `solve` that records."""
 
+    @wraps(original)
     def solve(subject: Any, *request: Any, **named: Any) -> Any:
-        """Plan; see the documentation of OMPL."""
         from brrt.ompl.session import Options, prepare  # noqa: PLC0415 - imports ompl
 
         name = f"{type(subject).__name__}.solve"
         arguments = (*request, *named.values())
         try:
-            tracker, limit = prepare(
-                subject, arguments, solves.next_file(), Options(), must_record=False
-            )
+            file = solves.next_file()
+            tracker, limit = prepare(subject, arguments, file, Options(), must_record=False)
         except BrrtError as error:
             solves.failed(name, error)
             return original(subject, *request, **named)

@@ -7,7 +7,10 @@ from brrt.recorder.adapters.solves import Solves
 from brrt.registry import Registry
 
 ADAPTERS: Registry[type[Adapter]] = Registry(
-    {"rrt-classes": "brrt.recorder.adapters.rrt_classes:RRTClasses"},
+    {
+        "rrt-classes": "brrt.recorder.adapters.rrt_classes:RRTClasses",
+        "ompl": "brrt.ompl.adapter:OmplAdapter",
+    },
     group="brrt.adapters",
     base="brrt.recorder.adapters.adapter:Adapter",
 )
