@@ -23,9 +23,10 @@ from brrt.collision.motions import Obstacles, first_hits
 
 mpl.use("agg")
 from matplotlib import pyplot as plt
+from matplotlib.collections import LineCollection
 
 WORLD = brrt.make_world("circles2d:n=900,min_radius=0.2,max_radius=0.4,seed=1")
-PLANNERS = {"RRTConnect": 5.0, "RRTstar": 2.0}
+PLANNERS = {"RRTConnect": 5.0, "RRTstar": 1.0}
 """The planners, and how long each may plan in seconds."""
 
 HIT = "#d62728"
@@ -49,7 +50,9 @@ def set_up(planner: str, resolution: float) -> geometric.SimpleSetup:
     for k in range(2):
         start[k], goal[k] = float(WORLD.start[k]), float(WORLD.goal[k])
     setup.setStartAndGoalStates(start, goal)
-    setup.setPlanner(getattr(geometric, planner)(information))
+    made = getattr(geometric, planner)(information)
+    made.setRange(8.0)
+    setup.setPlanner(made)
     return setup
 
 
@@ -82,15 +85,15 @@ def main() -> None:
         (path,) = list(recording.events()[brrt.Kind.PATH]["waypoints"])[-1:] or [None]
         print(f"{planner}: {edges.broken} of {edges.examined} recorded edges hit a circle ({file})")
         brrt.plot(recording, ax)
-        for ends in hits:
-            ax.plot(*ends.T, color=HIT, linewidth=2)
-        title = f"{planner}: {edges.broken} of {edges.examined} edges hit a circle"
+        ax.add_collection(LineCollection(hits, colors=HIT, linewidths=2.5, zorder=50))
+        title = f"{planner}: {edges.broken} of {edges.examined} edges"
         if path is not None:
             check = brrt.check_path(path.reshape(-1, 2), world=WORLD)
             part = f"{len(check.hits)} of {len(check.lengths)} motions of the last path"
             print(f"  {part} hit one; OMPL reports it as free")
-            title += f",\n{part} too"
-        ax.set_title(title)
+            title += f" and {part}"
+        ax.set_title("", loc="left")
+        ax.set_title(f"{title} hit a circle (red)", fontsize=10)
     figure.savefig(given.out, dpi=110)
     print(f"the picture is {given.out}, the recordings ompl_demo_*.mcap; try --resolution 0.0005")
     sys.stdout.flush()

@@ -7,8 +7,7 @@ within it.
 
 import gc
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from time import perf_counter_ns
 from typing import Any
 
@@ -21,6 +20,7 @@ from brrt.events import Status
 from brrt.ompl.batch import Moment
 from brrt.ompl.changes import Changes
 from brrt.ompl.checks import Checks
+from brrt.ompl.hooks import hooked
 from brrt.ompl.planner_data import GRAPHS, ONE_TREE, PlannerGraph, read_graph
 from brrt.ompl.problem import Problem
 from brrt.recorder.recorder import Recorder
@@ -39,10 +39,6 @@ _SAME_COST = 1e-9
 
 _FEWEST = 64
 """Iterations between two reads, at least, as long as it takes less than `_WAIT_NS`."""
-
-_PARTIAL_MOTIONS = ("KPIECE1", "LBKPIECE1")
-"""Planners that use how far a blocked motion is free. A validator in Python cannot tell them
-(ompl 2.0.1), and would change what they do: of these the configurations are followed."""
 
 
 class Tracker:
@@ -103,7 +99,7 @@ class Tracker:
         """
         self._origin = perf_counter_ns()
         try:
-            with self._hooked():
+            with hooked(self._problem.planner, self):
                 status = solve(self._condition(request))
             self._raise_kept()
         except BaseException:
@@ -149,29 +145,6 @@ class Tracker:
                 self._recorder.close(status)
             except Exception as error:  # noqa: BLE001 - see `error`
                 self.error = self.error or error
-
-    @contextmanager
-    def _hooked(self) -> Iterator[None]:
-        """Let checks of motions, or of configurations, be noted."""
-        information = self._problem.planner.getSpaceInformation()
-        motions = self._problem.name not in _PARTIAL_MOTIONS
-        validator = information.getMotionValidator()
-        if type(validator) is not base.MotionValidator:
-            motions = True  # in Python anyway
-        checker = information.getStateValidityChecker()
-        if motions:
-            information.setMotionValidator(_validator(information, validator, self))
-        else:
-            information.setStateValidityChecker(_noting(checker, self))
-        information.setup()  # setting either undoes that
-        try:
-            yield
-        finally:
-            if motions:
-                information.setMotionValidator(validator)
-            else:
-                information.setStateValidityChecker(checker)
-            information.setup()
 
     def _condition(self, request: Any) -> Any:
         """Return a stop condition that also follows the planner."""
@@ -276,46 +249,3 @@ class Tracker:
             return np.asarray(np.sqrt(((graph.q[i] - graph.q[j]) ** 2).sum(axis=1)))
         pairs = zip(i.tolist(), j.tolist(), strict=True)
         return np.array([cost(graph.states[a], graph.states[b]) for a, b in pairs])
-
-
-def _validator(information: Any, inner: Any, tracker: Tracker) -> Any:
-    """Return a validator that notes each motion that another one checks."""
-    free, read, note = inner.checkMotion, tracker.read, tracker.checks.extend
-    by_checks = tracker.by_checks
-
-    class Validator(base.MotionValidator):  # type: ignore[misc]
-        """Notes motions."""
-
-        def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - OMPL's name
-            """Return whether a motion is free."""
-            is_free: bool = free(a, b)
-            note((perf_counter_ns(), tracker.iteration, is_free, *read(a, b)))
-            return is_free
-
-    class CountingValidator(Validator):
-        """Notes motions of a planner whose stop condition is not followed."""
-
-        def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802 - OMPL's name
-            """Return whether a motion is free."""
-            try:
-                is_free: bool = super().checkMotion(a, b)
-                tracker.asked()
-            except BaseException as error:  # noqa: BLE001 - raised after `solve`
-                tracker.stop(error)
-                return False
-            return is_free
-
-    return (CountingValidator if by_checks else Validator)(information)
-
-
-def _noting(checker: Any, tracker: Tracker) -> Callable[[Any], bool]:
-    """Return a validity checker that notes the configurations that another one finds free."""
-    valid, read, note = checker.isValid, tracker.read, tracker.checks.extend
-
-    def is_valid(state: Any) -> bool:
-        found: bool = valid(state)
-        if found:
-            note((perf_counter_ns(), tracker.iteration, True, *read(state, state)))
-        return found
-
-    return is_valid

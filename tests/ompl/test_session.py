@@ -329,3 +329,42 @@ def test_nothing_is_leaked(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "leaked" not in done.stderr
+
+
+def test_a_recorder_that_fails_ends_planning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a full disk: the error is raised by `solve`, which does not use up its time."""
+
+    def fail(*_: Any) -> None:
+        raise brrt.BrrtError("the disk is full")
+
+    setup = point_setup("RRTstar", WORLD)
+    monkeypatch.setattr(brrt.Recorder, "put", fail)
+    with (
+        pytest.raises(brrt.BrrtError, match="the disk is full"),
+        brrt.ompl.record(setup, tmp_path / "run.mcap", world=WORLD),
+    ):
+        setup.solve(60.0)
+
+
+@pytest.mark.parametrize("planner", ["RRT", "RRTConnect", "RRTstar", "BITstar"])
+def test_several_starts_and_goals(tmp_path: Path, planner: str) -> None:
+    """The first start is the root, the first goal the goal; no rule minds the others."""
+    setup = point_setup(planner, WORLD)
+    information = setup.getSpaceInformation()
+    goals = base.GoalStates(information)
+    places = [(90.0, 95.0), (95.0, 90.0), (5.0, 9.0)]
+    state = [information.allocState() for _ in places]
+    for each, (x, y) in zip(state, places, strict=True):
+        each[0], each[1] = x, y
+    goals.addState(state[0])
+    goals.addState(state[1])
+    setup.setGoal(goals)
+    setup.addStartState(state[2])
+    with brrt.ompl.record(setup, tmp_path / "run.mcap", world=WORLD):
+        setup.solve(iterations(600))
+    recording = brrt.read(tmp_path / "run.mcap")
+    assert recorded_graph(recording) == planner_graph(setup)
+    found = brrt.verify(recording)
+    assert {each.rule for each in found.findings} <= {"path ends"}, str(found)
