@@ -27,6 +27,10 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
+_COSTING = [Kind.EDGE, Kind.REWIRE, Kind.VERTEX, Kind.CUT, Kind.CONNECT]
+"""Kinds that have a cost-to-come, or change what those of others are."""
+
+
 class Changes:
     """The graph as recorded so far; `update` returns what is new.
 
@@ -209,6 +213,8 @@ class Changes:
             (Kind.LINK, links, self._links), (Kind.CONNECT, bridges, self._bridges),
         ):  # fmt: skip
             fresh = [pair for pair in new if pair not in old]
+            if not fresh:
+                continue
             a, b = np.array(fresh, np.int64).reshape(-1, 2).T
             i, j = np.array([new[pair] for pair in fresh], np.int64).reshape(-1, 2).T
             found = checks.between(self._hash[a], self._hash[b])
@@ -248,16 +254,15 @@ class Changes:
 
     def _set_costs(self, columns: EventColumns) -> None:
         """Turn the lengths of motions into costs-to-come."""
+        rows = np.flatnonzero(np.isin(columns.kind, _COSTING))
+        costs, lengths = columns.reals[:, 0], columns.reals[rows, 0].tolist()
         events = zip(
-            range(len(columns.kind)), columns.kind.tolist(), columns.integers.tolist(),
-            columns.reals[:, 0].tolist(), strict=True,
+            rows.tolist(), columns.kind[rows].tolist(), *columns.integers[rows].T.tolist(), lengths,
+            strict=True,
         )  # fmt: skip
-        costs, (joins, moves) = (
-            columns.reals[:, 0],
-            zip(*((tree.join, tree.move) for tree in self.trees), strict=True),
-        )
+        joins, moves = zip(*((tree.join, tree.move) for tree in self.trees), strict=True)
         edge, rewire, vertex = int(Kind.EDGE), int(Kind.REWIRE), int(Kind.VERTEX)
-        for row, kind, (first, second, third), length in events:
+        for row, kind, first, second, third, length in events:
             if kind == edge:
                 costs[row] = joins[first](third, length)
             elif kind == rewire:
