@@ -135,5 +135,5 @@ def test_pictures_are_small_and_shown() -> None:
     gallery = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (ROOT / "docs" / "gallery.md").read_text())
     assert gallery == list(module.PICTURES)
     pictures = {path.name: path.stat().st_size for path in (ROOT / "docs").glob("*.png")}
-    assert pictures.keys() == {*gallery, "worlds.png"}
+    assert pictures.keys() == {*gallery, "worlds.png", "ompl_demo.png"}
     assert max(pictures.values()) < 200_000, pictures
