@@ -88,9 +88,16 @@ class Nodes:
 
     def join_many(self, q: Floats, parent: Ints, cost: Floats) -> None:
         """Add nodes."""
+        first = len(self)
         for column, values in ((self._q, q), (self.parent, parent), (self.cost, cost)):
             column.frombytes(np.ascontiguousarray(values).tobytes())
-        self._children = None
+        if self._children is None or len(parent) > first:
+            self._children = None  # gathering them all anew, if ever, takes as long
+            return
+        self._children += [set() for _ in range(len(parent))]
+        for child, up in enumerate(parent.tolist(), first):
+            if up >= 0:
+                self._children[up].add(child)
 
     def join_vertex(self, q: Sequence[float]) -> None:
         """Add a node that is no root and has no parent."""

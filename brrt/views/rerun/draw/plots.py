@@ -9,6 +9,10 @@ from brrt.views.rerun.draw.canvas import Canvas, growing_rows
 
 _ACCEPTED, _ITERATION_TIME = "/series/extensions/accepted", "/series/iteration_time"
 
+_DRAWN = frozenset((Kind.SAMPLE, Kind.EXPAND))
+_UNSAMPLED = frozenset((Kind.EDGE, Kind.LINK))
+"""What tells iterations apart, and what does in recordings without samples."""
+
 
 class ExtensionsPlot:
     """Plots the share of all extensions so far that was accepted, or rejected for each reason."""
@@ -22,7 +26,8 @@ class ExtensionsPlot:
 
     def write(self, events: Events) -> None:
         """Plot a batch."""
-        rejects, added = events[Kind.REJECT], (events[Kind.EDGE], events[Kind.EXPAND])
+        rejects = events[Kind.REJECT]
+        added = events[Kind.EDGE], events[Kind.EXPAND], events[Kind.LINK]
         before = self._added + sum(self._rejects.values())
 
         def plot(entity: str, have: int, table: Table, which: NDArray[np.int64]) -> None:
@@ -48,20 +53,27 @@ class IterationTimePlot:
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas, self._count = canvas, 0
-        self._before = (0, 0)
+        self._before, self._kinds = (0, 0), _UNSAMPLED
         canvas.plot_style(_ITERATION_TIME, "time an iteration", NEWEST)
 
     def write(self, events: Events) -> None:
         """Plot a batch: each iteration of most planners draws a sample or expands cells."""
-        for table in filter(len, (events[Kind.SAMPLE], events[Kind.EXPAND])):
-            rows = table[growing_rows(self._count, len(table)) - 1]
-            self._count += len(table)
-            t, iteration = (rows[name].astype(np.int64) for name in ("t", "iteration"))
-            passed = np.diff(t, prepend=self._before[0])
-            made = np.diff(iteration, prepend=self._before[1])
-            some = made > 0
-            self._canvas.plot(_ITERATION_TIME, rows[some], passed[some] / made[some] / 1e3)
-            self._before = (int(t[-1]), int(iteration[-1]))
+        if not _DRAWN.isdisjoint(events.counts):
+            self._kinds = _DRAWN
+        tables = [events[kind][["seq", "t", "iteration"]] for kind in sorted(self._kinds)]
+        table = np.concatenate(tables)
+        table = table[np.argsort(table["seq"])]
+        begun = np.diff(table["iteration"].astype(np.int64), prepend=self._before[1])
+        table = table[begun > 0]  # the first event of each iteration
+        if not len(table):
+            return
+        rows = table[growing_rows(self._count, len(table)) - 1]
+        self._count += len(table)
+        t, iteration = (rows[name].astype(np.int64) for name in ("t", "iteration"))
+        passed = np.diff(t, prepend=self._before[0])
+        made = np.diff(iteration, prepend=self._before[1])
+        self._canvas.plot(_ITERATION_TIME, rows, passed / made / 1e3)
+        self._before = (int(t[-1]), int(iteration[-1]))
 
 
 def _entity(reason: Reason) -> str:
