@@ -130,7 +130,8 @@ def _run(args: Sequence[str] | None) -> int:
         usage = getattr(error, "format_message", None)
         if usage is not None:
             if usage():  # empty where the help is printed instead of a command
-                complain(f"{usage()} (see brrt --help)")
+                where = getattr(getattr(error, "ctx", None), "command_path", "brrt")
+                complain(f"{usage()} (see {where} --help)")
             return Code.BAD_INPUT
         from brrt.errors import BrrtError
         from brrt.output_names import TakenError

@@ -26,8 +26,8 @@ class Tenth:
 
     Attributes:
         last: Its last iteration.
-        accepted: Share of the extensions that added a node, or of the expansions that were the
-            first of their cells; None without any.
+        accepted: Share of the extensions that added a node or a link, or of the expansions that
+            were the first of their cells; None without any.
         us: Microseconds per iteration; None without a real clock.
         nearest: Least distance to the goal by its end; None without a node or cell.
     """
@@ -110,7 +110,7 @@ class Facts:
         sides: Sides of the world's bounds.
         figures: The metrics, as `brrt replay --json` prints them.
         trees: Numbers of the trees.
-        accepted: Extensions that added a node, or first expansions of cells.
+        accepted: Extensions that added a node or a link, or first expansions of cells.
         failed: Extensions that added none, or further expansions of cells.
         reasons: Rejections by reason, most frequent first.
         gap: How close two trees came.

@@ -29,7 +29,10 @@ _END = 0.005
 def rows(f: Facts) -> Iterator[Row]:
     """Yield the facts, the outcome first."""
     scenario = f.scenario
-    yield "run", f"{scenario.planner} · {scenario.robot} · {scenario.world} · seed {scenario.seed}"
+    # Recordings of other planners that state no seed have that of the default.
+    known = f.contract.planner.registered or scenario.seed
+    seed = f" · seed {scenario.seed}" if known else ""
+    yield "run", f"{scenario.planner} · {scenario.robot} · {scenario.world}{seed}"
     for branch, change in zip(f.manifest.branches, changes_of(f.manifest), strict=True):
         parent = branch.file or "another run"
         yield "branched", f"from {parent} after iteration {branch.iteration:,}: {change}"
@@ -89,6 +92,9 @@ def _course(f: Facts) -> Iterator[Row]:
         (f"{unit} each", [t.us for t in f.tenths], size),
         ("to goal", [t.nearest for t in f.tenths], 1.0),
     ):
+        # With a tree from the goal, or in a graph, one tree's distance says nothing of the way.
+        if name == "to goal" and (len(f.trees) > 1 or f.figures["vertices"]):
+            continue
         if any(value is not None for value in values):
             yield name, _columns("-" if v is None else _compact(v / part) for v in values)
 
@@ -212,7 +218,7 @@ def _paths(f: Facts) -> Iterator[Row]:
     straight = ""
     lengths = f.manifest.claims.costs == "length"
     if f.approach is not None and f.approach.start > 0 and lengths:
-        straight = f", {p.best_cost / f.approach.start:.3g} times the straight line"
+        straight = f", {p.best_cost / f.approach.start:.2f} times the straight line"
     if p.paths == 1:
         yield "path", f"cost {_number(p.best_cost)}{straight}, found in iteration {p.first:,}"
         return

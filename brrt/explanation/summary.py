@@ -120,12 +120,13 @@ class RunSummary:
         self.metrics.write(events)
         reached = (int(table["iteration"].max()) for table in events.tables.values() if len(table))
         self.bins.reach(max(reached, default=0))  # in a damaged log they may fall
-        for kind in (Kind.SAMPLE, Kind.EXPAND, Kind.MOVE, Kind.EDGE):
+        for kind in (Kind.SAMPLE, Kind.EXPAND, Kind.MOVE, Kind.EDGE, Kind.LINK):
             table = events[kind]
             if len(table):
                 np.maximum.at(self.bins.t, table["iteration"] // self.bins.length, table["t"])
         if Kind.EDGE in events.counts or Kind.VERTEX in events.counts:
             self._add_nodes(joined_nodes(events))
+        self.bins.count(events[Kind.LINK], 0)
         if Kind.EXPAND in events.counts or Kind.MOVE in events.counts:
             self._add_expansions(events)
         self._add_rejects(events)

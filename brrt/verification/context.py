@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brrt.collision.clearance import first_contacts
 from brrt.collision.motions import Obstacles, first_hits
+from brrt.digits import digits_within
 from brrt.events import Events, Kind, Phase, Stage, Status, Table
 from brrt.recording import Recording
 from brrt.replay.graph import as_forest
+from brrt.replay.text import vector
 from brrt.replay.tree_fold import trees_in
 from brrt.robots import Robot
 from brrt.scenario.claims import Claims
@@ -174,6 +177,14 @@ class Context:
     def first_hits(self, a: Floats, b: Floats) -> Ints:
         """Return for each motion the number of an obstacle that it hits, or -1, shape (n,)."""
         return first_hits(self.obstacles, self.robot, np.asarray(a), np.asarray(b))
+
+    def hit_text(self, a: Floats, b: Floats, hit: int) -> str:
+        """Return what a motion hits, and where it begins to."""
+        a, b = np.asarray(a)[None], np.asarray(b)[None]
+        contact = first_contacts(self.obstacles, self.robot, a, b, np.array([hit]))
+        q = self.robot.interpolate(a[0], b[0], float(contact.part[0]))
+        place = vector(q, digits_within(self.lower, self.upper))
+        return f"{self.obstacles.name(int(contact.other[0]))} at {place}"
 
     @cached_property
     def trees(self) -> list[TreeHistory]:

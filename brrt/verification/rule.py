@@ -83,7 +83,7 @@ class Rule:
 
         def message(i: int) -> str:
             which = motion if field is None else f"{motion} {table[field][i]}"
-            return f"{which} hits {self.context.obstacles.name(int(hit[i]))}"
+            return f"{which} hits {self.context.hit_text(a[i], b[i], int(hit[i]))}"
 
         self.judge(table, hit >= 0, message)
 

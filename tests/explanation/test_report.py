@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -96,3 +97,20 @@ def test_a_goal_that_is_tried_more_often_than_once_an_iteration(tmp_path: Path) 
                 rec.reject([95, 95], 0)
     told = " ".join(str(explain(read(tmp_path / "run.mcap"))).split())
     assert "rejected 100 times (5 an iteration)" in told
+
+
+def test_a_graph_of_another_planner(tmp_path: Path) -> None:
+    """Links count as extensions; what one tree's distance says and a seed of ours are left out."""
+    with record(tmp_path / "run.mcap", world="circles2d:n=1", planner="mine") as rec:
+        nodes = [rec.edge([5, 5]), *(rec.vertex([10 + 8 * n, 90 - n]) for n in range(10))]
+        for number, pair in enumerate(pairwise(nodes), 1):
+            rec.iteration = number
+            rec.link(*pair)
+        rec.reject([50, 50], 3)
+    told = " ".join(str(explain(read(tmp_path / "run.mcap"))).split())
+    assert "91% of 11 extensions accepted" in told
+    assert "to goal" not in told
+    assert "seed" not in told
+    with record(tmp_path / "seeded.mcap", world="circles2d:n=1", planner="mine", seed=4) as rec:
+        rec.edge([5, 5])
+    assert "seed 4" in str(explain(read(tmp_path / "seeded.mcap")))

@@ -60,10 +60,12 @@ class PathsFree(Rule):
         starts = np.concatenate([path[:-1] for _, path in paths])
         hits = context.first_hits(starts, np.concatenate([path[1:] for _, path in paths]))
         ends = np.cumsum([max(len(path) - 1, 0) for _, path in paths])
-        for (event, _), hit in zip(paths, np.split(hits, ends[:-1]), strict=True):
-            blocked = np.flatnonzero(hit >= 0)
-            name = context.obstacles.name(int(hit[blocked[0]])) if len(blocked) else ""
-            self.judge_one(event, f"motion {blocked[0]} hits {name}" if len(blocked) else None)
+        for (event, path), hit in zip(paths, np.split(hits, ends[:-1]), strict=True):
+            wrong = None
+            if (hit >= 0).any():
+                i = int(np.argmax(hit >= 0))
+                wrong = f"motion {i} hits {context.hit_text(path[i], path[i + 1], int(hit[i]))}"
+            self.judge_one(event, wrong)
 
 
 class PathCosts(Rule):
@@ -222,10 +224,8 @@ class Shortcuts(Rule):
         if event["accepted"]:
             hit = int(context.first_hits(path[i][None], path[j][None])[0])
             if hit >= 0:
-                return (
-                    f"the motion from waypoint {i} to {j} hits {context.obstacles.name(hit)}",
-                    path,
-                )
+                where = context.hit_text(path[i], path[j], hit)
+                return f"the motion from waypoint {i} to {j} hits {where}", path
             path = np.concatenate([path[: i + 1], path[j:]])
         length = np.asarray(context.distance(path[:-1], path[1:]).sum())
         if not after <= cost * (1 + 1e-12):
