@@ -22,6 +22,7 @@ _MODULES = {
     "record": "recorder.record",
     "Recording": "recording",
     "Sink": "recording",
+    "Arm": "robots",
     "Chain": "robots",
     "Opaque": "robots",
     "Point": "robots",

@@ -29,6 +29,7 @@ from brrt.replay.snapshot import Snapshot as Snapshot
 from brrt.replay.snapshot import snapshot as snapshot
 from brrt.replay.transcript import transcript as transcript
 from brrt.robots import ROBOTS as ROBOTS
+from brrt.robots import Arm as Arm
 from brrt.robots import Chain as Chain
 from brrt.robots import Opaque as Opaque
 from brrt.robots import Point as Point

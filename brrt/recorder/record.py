@@ -15,7 +15,8 @@ from brrt.recorder.recorder import Recorder
 from brrt.recorder.values import configurations
 from brrt.recording import Result, Sink
 from brrt.replay.metrics import Metrics
-from brrt.robots import Opaque, Robot
+from brrt.robots import Arm, Opaque, Robot, make_robot
+from brrt.robots.robot import Floats
 from brrt.scenario.claims import Claims
 from brrt.scenario.contract import Contract
 from brrt.scenario.manifest import Manifest, made_by
@@ -131,17 +132,30 @@ def _problem(
         BrrtError: Too little is given, or something that does not fit.
     """
     place = world if world is None or isinstance(world, World) else make_world(str(world))
-    if robot is not None:
-        if place is None:
+    body = robot if robot is None or isinstance(robot, Robot) else str(robot)
+    if place is not None and body is not None:
+        return place, body
+    if body is not None:
+        arm = make_robot(body) if isinstance(body, str) else body
+        if not isinstance(arm, Arm):
             raise BrrtError(f"robot {robot!s:.60} needs a world; without one give dof alone")
-        return place, robot if isinstance(robot, Robot) else str(robot)
+        return World.unknown(arm.surroundings(*_ends(start, goal, len(arm.moving)))), body
     if dof is None:
         dof = np.size(start) if start is not None or place is None else place.dim
     if place is not None:
         return place, "point" if dof == place.dim else Opaque.parse("dof", {"numbers": dof})
-    if start is None or goal is None:
-        name = "start" if start is None else "goal"
-        raise BrrtError(f"{name} must be given: there is no world that has one")
-    body = Opaque.parse("robot opaque", {"numbers": dof, "drawn": 2 if dof < 3 else 3})
-    ends = [configurations(name, [q], dof) for name, q in (("start", start), ("goal", goal))]
-    return World.unknown(body.places(np.concatenate(ends))), body
+    unknown = Opaque.parse("robot opaque", {"numbers": dof, "drawn": 2 if dof < 3 else 3})
+    return World.unknown(unknown.places(np.concatenate(_ends(start, goal, dof)))), unknown
+
+
+def _ends(start: Any, goal: Any, dof: int) -> list[Floats]:
+    """Check start and goal where there is no world that has them, shape (1, dof) each.
+
+    Raises:
+        BrrtError: One is missing, or has the wrong size.
+    """
+    ends = {"start": start, "goal": goal}
+    for name, q in ends.items():
+        if q is None:
+            raise BrrtError(f"{name} must be given: there is no world that has one")
+    return [configurations(name, [q], dof) for name, q in ends.items()]

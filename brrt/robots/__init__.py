@@ -6,11 +6,13 @@ from pathlib import Path
 from brrt.errors import BrrtError, unknown
 from brrt.files import is_file, read_text
 from brrt.registry import Registry
+from brrt.robots.arm import Arm
 from brrt.robots.chain import Chain
 from brrt.robots.opaque import Opaque
 from brrt.robots.point import Point
 from brrt.robots.polygon import Polygon
 from brrt.robots.robot import SCHEMA, VERSION, Robot
+from brrt.robots.urdf import load_arm, split_urdf
 from brrt.settings import parse_pairs
 
 ROBOTS: Registry[type[Robot]] = Registry(
@@ -18,6 +20,7 @@ ROBOTS: Registry[type[Robot]] = Registry(
         "point": "brrt.robots.point:Point",
         "polygon": "brrt.robots.polygon:Polygon",
         "chain": "brrt.robots.chain:Chain",
+        "arm": "brrt.robots.arm:Arm",
         "opaque": "brrt.robots.opaque:Opaque",
     },
     group="brrt.robots",
@@ -32,13 +35,15 @@ def make_robot(spec: str) -> Robot:
     """Make a robot from its specification.
 
     Args:
-        spec: A name with parameters, such as `polygon:length=4,width=2`, or a JSON file.
+        spec: A name with parameters, such as `polygon:length=4,width=2`, a JSON file, or a URDF
+            with the ends of the chain, such as `arm.urdf:base=base_link,tip=tool0`.
 
     Raises:
         BrrtError: The robot is unknown, or a parameter is invalid.
     """
     if names_robot_file(spec):
-        return load_robot(Path(spec))
+        urdf = split_urdf(spec)
+        return load_robot(Path(spec)) if urdf is None else load_arm(Path(urdf[0]), urdf[1])
     name, _, rest = spec.partition(":")
     if name not in ROBOTS:
         raise unknown("robot", name, ROBOTS)
@@ -58,7 +63,7 @@ def mark_robot_file(spec: str) -> str:
 
 
 def _is_marked(spec: str) -> bool:
-    return spec.endswith(".json") or "/" in spec
+    return spec.endswith(".json") or "/" in spec or split_urdf(spec) is not None
 
 
 def load_robot(path: Path) -> Robot:
@@ -98,6 +103,7 @@ def robot_from_json(text: str) -> Robot:
 
 __all__ = [
     "ROBOTS",
+    "Arm",
     "Chain",
     "Opaque",
     "Point",

@@ -56,6 +56,7 @@ class Chain(Robot):
     """
 
     kind: ClassVar[str] = "chain"
+    curved: ClassVar[bool] = True
 
     links: int = param(3, "number of links", low=1, high=_MOST_LINKS)
     length: float | None = param(

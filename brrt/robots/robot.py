@@ -4,6 +4,7 @@ import json
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -19,6 +20,9 @@ Floats = NDArray[np.float64]
 
 SCHEMA, VERSION = "brrt.robot", 1
 
+_PIECES = 16
+"""Lines that a curve between two configurations is drawn as."""
+
 
 @dataclass(frozen=True, slots=True)
 class Robot(Settings):
@@ -30,11 +34,15 @@ class Robot(Settings):
         kind: The robot's name in the registry and in files.
         opaque: Whether its shape and limits are not known, so that nothing can be said of its
             collisions.
+        limited: Whether its bounds are limits of its own, which hold in any world.
+        curved: Whether its place follows a curve between two configurations.
     """
 
     greatest_number: ClassVar[float] = GREATEST
     kind: ClassVar[str]
     opaque: ClassVar[bool] = False
+    limited: ClassVar[bool] = False
+    curved: ClassVar[bool] = False
 
     def resolved(self, world: World) -> Self:  # noqa: ARG002
         """Return the robot with the settings filled in whose defaults depend on the world.
@@ -94,6 +102,21 @@ class Robot(Settings):
 
         Empty if the body is a point.
         """
+
+    def skeleton(self, Q: Floats) -> Floats:
+        """Lines that stand for a body without an outline, shape (n, k, d); k is 0 without any."""
+        return np.empty((len(Q), 0, 2))
+
+    def trail(self, path: Floats) -> Floats:
+        """Return the places that a path, shape (m, dof), leads through, shape (k, d).
+
+        They are those of the waypoints, and between them where they follow a curve.
+        """
+        if self.curved and len(path) > 1:
+            parts = np.arange(_PIECES) / _PIECES
+            legs = [self.interpolate(*pair, parts) for pair in pairwise(path)]
+            path = np.concatenate([*legs, path[-1:]])
+        return self.places(path)
 
     @abstractmethod
     def configuration(self, position: Floats) -> Floats | None:

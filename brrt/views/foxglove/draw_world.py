@@ -51,8 +51,14 @@ def dot(world: World, place: NDArray[np.floating], colour: Colour) -> Marker:
 
 
 def outline(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the edges of the body at a configuration, two points each, shape (2 n, 2)."""
-    return _edges(robot.outline(q))
+    """Return the edges of the body at a configuration, two points each, shape (2 n, d)."""
+    edges, line = _edges(robot.outline(q)), robot.skeleton(q[None])[0]
+    return edges if len(line) < 2 else pairs_along(line)  # noqa: PLR2004
+
+
+def pairs_along(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the pieces of a line, shape (k, d), two points each, shape (2 (k - 1), d)."""
+    return np.stack([line[:-1], line[1:]], axis=1).reshape(-1, line.shape[1])
 
 
 def static_messages(manifest: Manifest, world: World) -> Iterator[tuple[str, str, bytes]]:

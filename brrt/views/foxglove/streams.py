@@ -25,7 +25,15 @@ from brrt.views.colours import (
     path_style,
     tree_style,
 )
-from brrt.views.foxglove.draw_world import BODIES, GROUND, PATHS, dot, line_list, outline
+from brrt.views.foxglove.draw_world import (
+    BODIES,
+    GROUND,
+    PATHS,
+    dot,
+    line_list,
+    outline,
+    pairs_along,
+)
 from brrt.views.foxglove.interval_topics import BATCH, interval_messages
 from brrt.views.foxglove.messages import MARKER, Marker, MarkerType
 from brrt.worlds.world import World
@@ -117,7 +125,7 @@ class MarkerStreams:
     def _newest(self, number: int) -> Stream:
         """Show the body at the newest node, once in `BATCH` nodes."""
         table = self._of_tree(Kind.EDGE, number)
-        if not len(table) or not self._robot.outline(table["q"][0]):
+        if not len(table) or not len(outline(self._robot, table["q"][0])):
             return
         ends = np.append(np.arange(BATCH - 1, len(table) - 1, BATCH), len(table) - 1)
         for row in table[ends]:
@@ -139,8 +147,7 @@ class MarkerStreams:
         """Show the newest path of each stage."""
         for row in self._events[Kind.PATH]:
             name, colour, radius = path_style(Stage(int(row["stage"])))
-            places = self._places(row["waypoints"])
-            legs = np.stack([places[:-1], places[1:]], axis=1).reshape(-1, self._world.dim)
+            legs = pairs_along(self._robot.trail(row["waypoints"]))
             yield _message(
                 row, f"/viz/path/{name}", line_list(self._world, legs, colour, 2 * radius, PATHS)
             )

@@ -1,7 +1,6 @@
 """Axes with a run at an instant: the world, trees or cells, paths and bodies."""
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,6 @@ MOST_VECTORS = 3000
 _LINES_IN_PATH = 64
 _GHOSTS = 10
 """Bodies along a path."""
-_PARTS = 16
-"""Pieces of a motion between two configurations of a body, whose place may follow a curve."""
 _LAYERS = {"cells": 2.0, "rejects": 2.1, "links": 2.15, "tree": 2.2, "ghosts": 2.5,
            "trace": 2.7, "path": 3.0, "end": 5.0, "robot": 6.0}  # fmt: skip
 
@@ -70,6 +67,7 @@ class TreePanel:
             )
         self._trace = self._collection(style.ROBOT, 0.5, "trace", 0.6, "moves")
         self._ghosts = self._bodies([], style.SMOOTHED, "ghosts") if self._flat else None
+        self._skeletons = self._collection(style.SMOOTHED, 0.9, "ghosts", 0.45)
         self._paths = {
             name: (self._line(width + 0.8, "white", None), self._line(width, colour, label))
             for name, width, colour, label in (
@@ -104,10 +102,12 @@ class TreePanel:
         raw = None if playback.learns else paths.raw
         for name, found in (("raw", raw), ("short", paths.short)):
             for line in self._paths[name]:
-                self._place(line, self._path_places(found[0]) if found else np.empty((0, 2)))
+                self._place(line, self._robot.trail(found[0]) if found else np.empty((0, 2)))
         if self._ghosts is not None:
             bodies = [] if best is None else list(self._robot.along(best[0], _GHOSTS))
             self._ghosts.set_verts([part for q in bodies for part in self._robot.outline(q)])
+        along = [] if best is None else self._robot.skeleton(self._robot.along(best[0], _GHOSTS))
+        self._skeletons.set_segments([line for line in along if len(line)])
         moving = trace and not np.array_equal(trace[-1][-1], self._end(self._manifest.goal))
         self._place(self._here, trace[-1][-1:] if moving else np.empty((0, 2)))
         self._caption.set_text(self._text(seq, best[1] if best else None))
@@ -138,6 +138,9 @@ class TreePanel:
                                 ("goal", manifest.goal, style.GOAL)):  # fmt: skip
             if self._flat:
                 self._bodies([np.array(q)], colour, "end", 0.35)
+            for line in self._robot.skeleton(np.array([q])):
+                if len(line):
+                    ax.plot(*line.T, color=colour, lw=2, marker=".", ms=4, zorder=_LAYERS["path"], label="_")
             (dot,) = ax.plot(
                 *self._end(q)[:, None], ls="", marker="o", ms=5, color=colour, mec="white",
                 mew=0.7, zorder=_LAYERS["end"], label=name,
@@ -234,14 +237,6 @@ class TreePanel:
         else:
             self._cells._offsets3d = tuple(places.T)  # noqa: SLF001 - no public API
         self._cells.set_array(values)
-
-    def _path_places(self, path: Floats) -> Floats:
-        """Return places along a path; a body's place may follow a curve between waypoints."""
-        if len(path) > 1 and self._robot.outline(path[0]):
-            parts = np.arange(_PARTS) / _PARTS
-            legs = [self._robot.interpolate(*pair, parts) for pair in pairwise(path)]
-            path = np.concatenate([*legs, path[-1:]])
-        return self._robot.places(path)
 
     def _end(self, q: Any) -> Floats:
         place: Floats = self._robot.places(np.array([q], np.float64))[0]

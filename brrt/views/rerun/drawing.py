@@ -17,7 +17,7 @@ from brrt.views.rerun import layout
 from brrt.views.rerun.draw.canvas import Canvas
 from brrt.views.rerun.draw.cells import CellsDrawing
 from brrt.views.rerun.draw.decimate import DrawnNodes
-from brrt.views.rerun.draw.paths import MovesDrawing, PathsDrawing
+from brrt.views.rerun.draw.paths import MovesDrawing, PathsDrawing, body_lines
 from brrt.views.rerun.draw.plots import ExtensionsPlot, IterationTimePlot
 from brrt.views.rerun.draw.transient import TransientDrawing
 from brrt.views.rerun.draw.trees import TreesDrawing
@@ -122,11 +122,16 @@ def _log_ends(rec: rr.RecordingStream, manifest: Manifest, frame: Frame) -> None
     """Draw start and goal, and the body there."""
     robot = manifest.make_robot()
     for name, q, colour in (("start", manifest.start, START), ("goal", manifest.goal, GOAL)):
-        parts = map(frame.points, robot.outline(np.array(q)))
-        body = [np.concatenate([part, part[:1]]) for part in parts]
-        if body:
-            outline = rr.LineStrips2D(body, colors=colour, radii=-1.5, draw_order=90)
-            rec.log(f"/world/{name}/body", outline, static=True)
+        body = [frame.points(line) for line in body_lines(robot, np.array(q))]
+        if body and manifest.dim == 2:
+            rec.log(
+                f"/world/{name}/body",
+                rr.LineStrips2D(body, colors=colour, radii=-1.5, draw_order=90),
+                static=True,
+            )
+        elif body:
+            lines = rr.LineStrips3D(body, colors=colour, radii=-3)
+            rec.log(f"/world/{name}/body", lines, static=True)
         log_marker(rec, frame.drawn, name, frame.places([q], robot), colour)
 
 

@@ -50,6 +50,10 @@ class Canvas:
         """Return where configurations, shape (n, dof), are drawn, shape (n, dim)."""
         return self.frame.places(values, self.robot)
 
+    def trail(self, path: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return where a path, shape (m, dof), is drawn, shape (k, dim); see `Robot.trail`."""
+        return np.ascontiguousarray(self.frame.points(self.robot.trail(path)), np.float32)
+
     def style(
         self, entity: str, archetype: Any, colour: Colour, radius: float, layer: float
     ) -> None:

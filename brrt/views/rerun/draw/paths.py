@@ -7,6 +7,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Stage, Table
+from brrt.robots import Robot
 from brrt.scenario.contracts import contract_of
 from brrt.scenario.manifest import Manifest
 from brrt.views.colours import GHOST, ROBOT, TRACE, TRACE_ON_CELLS, path_style
@@ -51,7 +52,7 @@ class PathsDrawing:
             name, colour, radius = path_style(stage)
             canvas.style(f"/world/path/{name}", canvas.lines, colour, -radius, 40.0 + stage)
         canvas.plot_style("/series/cost", "cost", path_style(Stage.SMOOTHED)[1], dots=True)
-        canvas.style(GHOSTS_ENTITY, rr.LineStrips2D, GHOST, -0.75, 35.0)
+        canvas.style(GHOSTS_ENTITY, canvas.lines, GHOST, -0.75, 35.0)
 
     def write(self, events: Events) -> None:
         """Draw each path, and the path after each accepted shortcut."""
@@ -72,7 +73,7 @@ class PathsDrawing:
                 self._path = np.delete(self._path, slice(event["i"] + 1, event["j"]), axis=0)
             if self._path is not None and (stage is not None or len(self._path) <= _LONGEST_SHOWN):
                 shown = Stage.SMOOTHED if stage is None else stage
-                drawn.setdefault(shown, []).append((event, self._canvas.places(self._path)))
+                drawn.setdefault(shown, []).append((event, self._canvas.trail(self._path)))
         for stage, items in drawn.items():
             places = [place for _, place in items]
             strips = self._canvas.strips(np.concatenate(places), [len(place) for place in places])
@@ -102,7 +103,7 @@ class PathsDrawing:
     def _draw_ghosts(self, event: Any) -> None:
         """Draw the body along a path, at even distances in the robot's metric."""
         path, robot = event["waypoints"], self._canvas.robot
-        if not robot.outline(path[0]):
+        if not has_body(robot, path[0]):
             return
         steps = float(event["cost"]) / (_APART * self._canvas.frame.world.extent)
         poses = list(robot.along(path, int(np.clip(steps + 1, 2, _GHOSTS))))
@@ -132,7 +133,7 @@ class MovesDrawing:
         colour = TRACE_ON_CELLS[canvas.dim] if edge else TRACE
         canvas.style(TRACE_ENTITY, canvas.lines, colour, -0.4 if edge else -0.5, 28.0)
         canvas.style(ROBOT_ENTITY, canvas.points, ROBOT, -5, 60.0)
-        if canvas.dim == 2:
+        if has_body(canvas.robot, np.array(manifest.start)):
             canvas.style(BODY_ENTITY, canvas.lines, ROBOT, -1.5, 55.0)
         if edge:
             canvas.style(TAIL_ENTITY, canvas.points, ROBOT, -1.25, 30.0)
@@ -154,7 +155,7 @@ class MovesDrawing:
             half = np.full((len(rows), self._canvas.dim), self._edge / 2, np.float32)
             cells = self._canvas.boxes.columns(centers=places[shown], half_sizes=half)
             self._canvas.send_rows(CELL_ENTITY, rows, ones, cells)
-        if self._canvas.robot.outline(table["q"][0]):
+        if has_body(self._canvas.robot, table["q"][0]):
             draw_bodies(self._canvas, BODY_ENTITY, rows, [[q] for q in rows["q"]])
 
     def _draw_trace(self, table: Table) -> NDArray[np.float32]:
@@ -174,13 +175,24 @@ class MovesDrawing:
         return places
 
 
+def has_body(robot: Robot, q: NDArray[np.float64]) -> bool:
+    """Whether a robot has lines that show its body."""
+    return bool(body_lines(robot, q))
+
+
+def body_lines(robot: Robot, q: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the lines that show a body, shape (k, d) each: its outline, or its skeleton."""
+    outline = [np.concatenate([part, part[:1]]) for part in robot.outline(q)]
+    return outline or [line for line in robot.skeleton(q[None]) if len(line)]
+
+
 def draw_bodies(canvas: Canvas, entity: str, rows: Table, poses: list[Any]) -> None:
     """Draw the body at one configuration or more, a list of them a row."""
     strips, counts = list[NDArray[np.float32]](), []
     for row in poses:
-        parts = [canvas.frame.points(part) for q in row for part in canvas.robot.outline(q)]
-        strips += [np.concatenate([part, part[:1]]).astype(np.float32) for part in parts]
-        counts.append(len(parts))
+        lines_of = [line for q in row for line in body_lines(canvas.robot, q)]
+        strips += [canvas.frame.points(line).astype(np.float32) for line in lines_of]
+        counts.append(len(lines_of))
     if strips:
         lines = canvas.strips(np.concatenate(strips), [len(strip) for strip in strips])
         canvas.send_rows(entity, rows, np.array(counts), lines)

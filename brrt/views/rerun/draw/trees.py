@@ -12,7 +12,7 @@ from brrt.views.rerun.draw.canvas import Canvas, growing_rows, merged, times_of
 from brrt.views.rerun.draw.decimate import DRAWN_IN_FULL, DrawnNodes, one_in_stride
 from brrt.views.rerun.draw.graphs import GraphsDrawing
 from brrt.views.rerun.draw.pages import Pages
-from brrt.views.rerun.draw.paths import draw_bodies
+from brrt.views.rerun.draw.paths import draw_bodies, has_body
 from brrt.views.rerun.draw.transient import TransientDrawing
 from brrt.views.rerun.layout import LINK_ENTITY
 
@@ -119,7 +119,7 @@ class _TreeDrawing:
 
     def _draw_newest(self, edges: Table) -> None:
         """Draw the body at some of the newest nodes."""
-        if len(edges) and self._canvas.robot.outline(edges["q"][0]):
+        if len(edges) and has_body(self._canvas.robot, edges["q"][0]):
             ends = growing_rows(self._nodes.count - len(edges), len(edges))
             rows, entity = edges[ends - 1], f"/world/newest/{self._name}"
             if self._nodes.count == len(edges):
