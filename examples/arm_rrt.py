@@ -1,9 +1,10 @@
-"""A small RRT of our own for the arm in arm6.urdf, recorded: python examples/arm_rrt.py
+"""A small RRT of our own for the arm in arm6.urdf, recorded to arm_rrt.mcap.
 
-The file arm_rrt.mcap can then be explained, verified and viewed: `brrt view arm_rrt.mcap`.
+For example `brrt verify arm_rrt.mcap` and `brrt view arm_rrt.mcap` read that file.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,28 +14,24 @@ STEP, RADIUS = 0.3, 0.06
 START, GOAL = np.array([-1.2, 0.9, 0.9, 0.0, 0.6, 0.0]), np.array([1.2, 0.9, 0.9, 0.0, 0.6, 1.0])
 
 arm = brrt.make_robot(str(Path(__file__).with_name("arm6.urdf")))
-cell = brrt.World(
-    "cell",
-    lower=[-1.1, -1.1, 0],
-    upper=[1.1, 1.1, 1.4],
-    boxes=[[0.25, -0.1, 0.0, 0.9, 0.1, 0.75]],
-    balls=[[0.4, 0.7, 0.9, 0.15]],
-)
+box, ball = [0.25, -0.1, 0.0, 0.9, 0.1, 0.75], [0.4, 0.7, 0.9, 0.15]
+lower, upper = np.array([-1.1, -1.1, 0]), np.array([1.1, 1.1, 1.4])
+cell = brrt.World("cell", lower, upper, boxes=np.array([box]), balls=np.array([ball]))
 
 
-def free(q):
+def free(q: Any) -> Any:
     """Whether spheres along the links are clear of the obstacles, at configurations (n, 6)."""
     joints = arm.skeleton(q)[:, 1:]
     parts = np.linspace(0, 1, 6)[:, None]
     spheres = joints[:, :-1, None] * (1 - parts) + joints[:, 1:, None] * parts
     centre = spheres.reshape(len(q), -1, 3)
     nearest = np.clip(centre, cell.boxes[0, :3], cell.boxes[0, 3:])
-    box = np.linalg.norm(centre - nearest, axis=-1) > RADIUS
-    ball = np.linalg.norm(centre - cell.balls[0, :3], axis=-1) > RADIUS + cell.balls[0, 3]
-    return (box & ball & (centre[..., 2] > RADIUS)).all(axis=1)
+    off_box = np.linalg.norm(centre - nearest, axis=-1) > RADIUS
+    off_ball = np.linalg.norm(centre - cell.balls[0, :3], axis=-1) > RADIUS + cell.balls[0, 3]
+    return (off_box & off_ball & (centre[..., 2] > RADIUS)).all(axis=1)
 
 
-def plan(rec, rng):
+def plan(rec: brrt.Recorder, rng: np.random.Generator) -> None:
     """Grow a tree from the start until it reaches the goal."""
     lower, upper = arm.bounds(cell)
     nodes, parents = [START], [-1]
@@ -55,8 +52,8 @@ def plan(rec, rng):
             way = []
             while at >= 0:
                 way, at = [nodes[at], *way], parents[at]
-            return rec.path(way)
-    return None
+            rec.path(way)
+            return
 
 
 with brrt.record("arm_rrt.mcap", world=cell, robot=arm, start=START, goal=GOAL) as rec:

@@ -80,7 +80,8 @@ class Arm(Robot):
         if not isinstance(joints, list) or not 0 < len(joints) <= _MOST_JOINTS:
             raise BrrtError(f"robot: joints must be a list of 1 to {_MOST_JOINTS} joints")
         found = [_joint(f"joints[{i}]", joint) for i, joint in enumerate(joints)]
-        arm = cls(data.get("drawn", 3), *(name_of(n, data[n]) for n in ("base", "tip")))
+        base, tip = (name_of(end, data[end]) for end in ("base", "tip"))
+        arm = cls(data.get("drawn", 3), base, tip)
         return arm.with_joints(found)
 
     def with_joints(self, joints: list[ArmJoint]) -> Self:
@@ -134,7 +135,7 @@ class Arm(Robot):
         """Say which joint is beyond its limits; nothing else is known."""
         for joint, value in zip(self.moving, q.tolist(), strict=True):
             if joint.limits is not None and not joint.limits[0] <= value <= joint.limits[1]:
-                at, low, high = against_limits(value, *joint.limits)
+                at, low, high = against_limits(value, joint.limits[0], joint.limits[1])
                 return f"has joint {joint.name} at {at}, beyond its limits {low} to {high}"
         return None
 
@@ -252,8 +253,8 @@ def _joint(where: str, data: Any) -> ArmJoint:
     """Read a joint from a definition."""
     check_fields(data, where, ArmJoint._fields)
     name = name_of(f"{where} name", data["name"])
-    values = (data[field] for field in ArmJoint._fields[2:])
-    return joint_of(name, data["type"], *values, where=where)
+    xyz, rpy, axis, limits = (data[field] for field in ArmJoint._fields[2:])
+    return joint_of(name, data["type"], xyz, rpy, axis, limits, where)
 
 
 def _fixed_axes(roll: float, pitch: float, yaw: float) -> Floats:

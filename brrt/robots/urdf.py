@@ -99,7 +99,7 @@ def _parse(text: str) -> ET.Element:
     if root.tag != "robot":
         xacro = "; expand it by xacro first" if "xacro" in text[:2000] else ""
         raise BrrtError(f"not a URDF: the root element is {root.tag!r:.60}, not 'robot'{xacro}")
-    return root  # type: ignore[no-any-return]
+    return root
 
 
 def _arm(root: ET.Element, values: Mapping[str, str]) -> Arm:

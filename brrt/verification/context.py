@@ -46,7 +46,11 @@ def _unknown(claims: Claims, robot: Robot, world: World) -> dict[str, str]:
     stated.pop("goal_tolerance", None)  # it excludes nothing
     found = {name: f"the recording claims {name}: {value}" for name, value in stated.items()}
     if robot.opaque or not world.bounded:
-        why = _UNKNOWN_ROBOT[robot.limited] if robot.limited or world.bounded else "the world is not known"
+        why = (
+            _UNKNOWN_ROBOT[robot.limited]
+            if robot.limited or world.bounded
+            else "the world is not known"
+        )
         found["collisions"] = why
         if not robot.limited:
             found["bounds"] = why

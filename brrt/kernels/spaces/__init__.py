@@ -17,6 +17,19 @@ SPACES: Mapping[type[Robot], Callable[[Any, World], Any]] = {
 }
 
 
+def check_plannable(robot: Robot) -> None:
+    """Check that it is known what a robot hits.
+
+    Raises:
+        BrrtError: It is not.
+    """
+    if robot.opaque:
+        raise BrrtError(
+            f"robot {robot.kind} cannot plan: its shape is unknown; choose point, polygon or "
+            "chain, or record a planner of your own by brrt.record (docs/python.md)"
+        )
+
+
 def make_space(robot: Robot, world: World) -> Any:
     """Build the configuration space of a robot in a world: a NamedTuple, see `brrt.kernels.space`.
 
@@ -29,10 +42,7 @@ def make_space(robot: Robot, world: World) -> Any:
     Raises:
         BrrtError: No space is registered for the robot.
     """
-    if robot.opaque:
-        raise BrrtError(
-            f"robot {robot.kind} cannot plan: its shape is unknown; choose point, polygon or chain"
-        )
+    check_plannable(robot)
     kinds = [kind for kind in type(robot).__mro__ if kind in SPACES]  # itself, or what it extends
     if not kinds:
         raise BrrtError(

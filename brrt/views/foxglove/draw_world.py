@@ -53,7 +53,7 @@ def dot(world: World, place: NDArray[np.floating], colour: Colour) -> Marker:
 def outline(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the edges of the body at a configuration, two points each, shape (2 n, d)."""
     edges, line = _edges(robot.outline(q)), robot.skeleton(q[None])[0]
-    return edges if len(line) < 2 else pairs_along(line)  # noqa: PLR2004
+    return edges if len(line) < 2 else pairs_along(line)
 
 
 def pairs_along(line: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -106,8 +106,11 @@ class TreePanel:
         if self._ghosts is not None:
             bodies = [] if best is None else list(self._robot.along(best[0], _GHOSTS))
             self._ghosts.set_verts([part for q in bodies for part in self._robot.outline(q)])
-        along = [] if best is None else self._robot.skeleton(self._robot.along(best[0], _GHOSTS))
-        self._skeletons.set_segments([line for line in along if len(line)])
+        if best is not None:
+            lines = self._robot.skeleton(self._robot.along(best[0], _GHOSTS))
+            self._skeletons.set_segments(list(lines) if lines.shape[1] else [])
+        else:
+            self._skeletons.set_segments([])
         moving = trace and not np.array_equal(trace[-1][-1], self._end(self._manifest.goal))
         self._place(self._here, trace[-1][-1:] if moving else np.empty((0, 2)))
         self._caption.set_text(self._text(seq, best[1] if best else None))
@@ -140,7 +143,15 @@ class TreePanel:
                 self._bodies([np.array(q)], colour, "end", 0.35)
             for line in self._robot.skeleton(np.array([q])):
                 if len(line):
-                    ax.plot(*line.T, color=colour, lw=2, marker=".", ms=4, zorder=_LAYERS["path"], label="_")
+                    ax.plot(
+                        *line.T,
+                        color=colour,
+                        lw=2,
+                        marker=".",
+                        ms=4,
+                        zorder=_LAYERS["path"],
+                        label="_",
+                    )
             (dot,) = ax.plot(
                 *self._end(q)[:, None], ls="", marker="o", ms=5, color=colour, mec="white",
                 mew=0.7, zorder=_LAYERS["end"], label=name,

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from brrt.events import Events, Kind, Stage, Table
