@@ -147,7 +147,10 @@ def test_a_seek_shows_the_paths(name: str, shown: Callable[[str], Shown]) -> Non
         for stage in Stage:
             past = [row for row in log[Kind.PATH] if row["t"] <= t and row["stage"] == stage]
             drawn = segments(given.at(t, f"/viz/path/{stage.name.lower()}"))
-            places = robot.places(past[-1]["waypoints"]) if past else np.empty((0, 2))
+            path = (
+                past[-1]["waypoints"] if past else np.empty((0, robot.dof(given.recording.world)))
+            )
+            places = robot.trail(path)  # curves where the robot turns; see tests/robots
             want = lines(places[:-1], places[1:])
             assert [end[:2] for pair in drawn for end in pair] == [
                 end[:2] for pair in want for end in pair
