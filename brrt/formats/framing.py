@@ -20,7 +20,10 @@ def framed(recording: Recording) -> Recording:
     if recording.world.bounded:
         return recording
     robot, manifest = recording.robot(), recording.manifest
-    found = robot.places(np.array([manifest.start, manifest.goal]))
+    ends = np.array([manifest.start, manifest.goal])
+    found = robot.places(ends)
+    if body := [line for line in robot.skeleton(ends) if len(line)]:
+        found = np.concatenate([found, *body])
     with suppress(BrokenError):
         for batch in recording.batches():
             found = np.concatenate([found, *_places(batch, robot)])

@@ -265,6 +265,7 @@ def test_a_recording_needs_no_file(tmp_path: Path) -> None:
     """The manifest has the joints, and all readers work from it."""
     recording = package.read(recorded(tmp_path))
     assert isinstance(recording.robot(), Arm)
+    assert recording.world.inside([0, 0, 0])  # the base is within what is drawn
     assert recording.robot().coordinates(CELL) == ("j", "k")
     found = package.verify(recording)
     assert not found.findings
