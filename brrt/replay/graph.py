@@ -194,7 +194,9 @@ def uses_of_removed(events: Events, tree: int) -> list[tuple[np.void, int]]:
     removals = of_tree(events[Kind.REMOVE], tree)
     if not len(removals):
         return []
-    when = removal_times(events, tree, int(removals["node"].max(initial=-1)) + 1)
+    # By the removed nodes alone: the greatest number of a node says nothing of how many there are.
+    removed, first = np.unique(removals["node"], return_index=True)
+    when = removals["seq"][first]
     found = []
     for kind, fields in _USES.items():
         for name, of in fields:
@@ -202,9 +204,9 @@ def uses_of_removed(events: Events, tree: int) -> list[tuple[np.void, int]]:
             if of not in (None, tree) or not len(table):
                 continue
             nodes = table[name]
-            known = np.flatnonzero((nodes >= 0) & (nodes < len(when)))
-            late = known[table["seq"][known] > when[nodes[known]]]
-            found += [(table[i], int(nodes[i])) for i in late]
+            at = np.minimum(np.searchsorted(removed, nodes), len(removed) - 1)
+            late = (nodes >= 0) & (removed[at] == nodes) & (table["seq"] > when[at])
+            found += [(table[i], int(nodes[i])) for i in np.flatnonzero(late)]
     return sorted(found, key=lambda pair: int(pair[0]["seq"]))
 
 

@@ -14,8 +14,9 @@ from brrt.events import Reason, Source, Stage
 Colour = tuple[int, int, int]
 
 FREE: Colour = (18, 20, 26)
-OBSTACLE: Colour = (94, 100, 114)
-"""Lighter than free space by 3:1 at least, in 2D as in 3D; trees and paths are lighter still."""
+OBSTACLE: Colour = (102, 101, 100)
+"""Lighter than free space by 3:1 at least, in 2D as in 3D; trees and paths are lighter still. Its
+hue differs from that of the world's outline."""
 OBSTACLE_3D: Colour = (112, 120, 137)
 OUTLINE: Colour = (96, 103, 118)
 START: Colour = (255, 145, 30)

@@ -12,8 +12,8 @@ def test_faults() -> None:
     """What a killed run leaves can be recovered, and no damaged copy reads as another run."""
     script = Path(__file__).parents[2] / "benchmarks" / "faults.py"
     done = subprocess.run(
-        [sys.executable, script, "--kills", "1", "--copies", "36"],
+        [sys.executable, script, "--kills", "1", "--foreign", "1", "--copies", "36"],
         capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("findings: 0") == 2
+    assert done.stdout.count("findings: 0") == 3

@@ -1,5 +1,6 @@
 """Recordings that break rules about graphs and pruning, and honest ones that do not."""
 
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -169,3 +170,15 @@ def test_no_graph_makes_a_rule_fail(name: str, seed: int) -> None:
             table["tree"][rng.integers(len(table))] = rng.integers(0, 3)
             log = Events(log.dof, {**log.tables, kind: table})
     assert str(judged(replace(case, log=log)))
+
+
+def test_a_removed_node_of_a_great_number_takes_little_memory() -> None:
+    """Nothing is as long as the greatest number of a node that an event names."""
+    case = recorded("lazy-prm")
+    log = case.edit(Kind.REMOVE, 0, node=2**31 - 1).log
+    tracemalloc.start()
+    try:
+        assert not judged(replace(case, log=log)).holds
+        assert tracemalloc.get_traced_memory()[1] < 64 << 20
+    finally:
+        tracemalloc.stop()
