@@ -28,7 +28,7 @@ _reported: set[str] = set()
 
 
 def on_broken(report: Callable[[str], None]) -> None:
-    """Say who is told of broken plug-ins, once of each: one line. By default it is a warning."""
+    """Set what reports a broken plug-in, once and in one line; by default a warning does."""
     global _report  # noqa: PLW0603 - one command line for a process
     _report = report
 

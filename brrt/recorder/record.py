@@ -139,7 +139,9 @@ def _problem(
         arm = make_robot(body) if isinstance(body, str) else body
         if not isinstance(arm, Arm):
             raise BrrtError(f"robot {robot!s:.60} needs a world; without one give dof alone")
-        return World.unknown(arm.surroundings(*_ends(start, goal, len(arm.moving)))), body
+        ends = np.concatenate(_ends(start, goal, len(arm.moving)))
+        # Readers replace these bounds by those of the whole log.
+        return World.unknown(np.concatenate(arm.skeleton(ends))), body
     if dof is None:
         dof = np.size(start) if start is not None or place is None else place.dim
     if place is not None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brrt.errors import BrrtError
 from brrt.event_columns import COUNT, FIRST_SEQ, POINTS, EventColumns
-from brrt.events import Kind, Phase, Reason, Source, Stage, Status, Table
+from brrt.events import Kind, Phase, Reason, Source, Stage, Status, Table, table_dtype
 from brrt.recorder import log
 from brrt.recorder.buffers import Buffer, apply_changes, check_events, columns_of, rising
 from brrt.recorder.graph_events import GraphEvents
@@ -369,7 +369,7 @@ class Recorder(GraphEvents):
         """
         with self._lock:
             columns = replace(columns, t=rising(columns.t, self._rows.last_t))
-            self._put_columns(columns, columns.events()[Kind.PATH])
+            self._put_columns(columns, np.empty(0, table_dtype(Kind.PATH, self._dof)))
 
     def _put_columns(self, columns: EventColumns, paths: Table) -> None:
         """Record checked events, of which the paths have waypoints."""

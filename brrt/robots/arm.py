@@ -20,8 +20,6 @@ FIXED, CONTINUOUS, PRISMATIC, REVOLUTE = "fixed", "continuous", "prismatic", "re
 TYPES = (FIXED, CONTINUOUS, PRISMATIC, REVOLUTE)
 
 _MOST_JOINTS, _LONGEST_NAME = 256, 200
-_DRAWN = 512
-"""Random configurations whose bodies a world that is not known is drawn around."""
 
 
 class ArmJoint(NamedTuple):
@@ -188,15 +186,6 @@ class Arm(Robot):
     def skeleton(self, Q: Floats) -> Floats:
         """The base, the joints and the tip; see `Robot.skeleton`."""
         return self.forward(Q)[0][..., : self.drawn]
-
-    def surroundings(self, *ends: Any) -> Floats:
-        """Return points that a world is drawn around if none is given, shape (n, 3).
-
-        They are on the arm at given configurations, and at random ones that are always the same.
-        """
-        rng = np.random.Generator(np.random.PCG64(0))
-        Q = rng.uniform(*self.bounds(), (_DRAWN, len(self.moving)))
-        return self.skeleton(np.concatenate([Q, *ends])).reshape(-1, self.drawn)
 
     def outline(self, q: Floats) -> list[Floats]:  # noqa: ARG002
         """Empty: it is not known."""

@@ -32,9 +32,6 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
-_UNKNOWN_ROBOT = ("the robot is not known", "the robot's shape is not known")
-
-
 def waypoints(event: Any, dof: int) -> Floats:
     """Return the configurations of a path event, shape (n, dof)."""
     return np.asarray(event["waypoints"], np.float64).reshape(-1, dof)
@@ -46,14 +43,10 @@ def _unknown(claims: Claims, robot: Robot, world: World) -> dict[str, str]:
     stated.pop("goal_tolerance", None)  # it excludes nothing
     found = {name: f"the recording claims {name}: {value}" for name, value in stated.items()}
     if robot.opaque or not world.bounded:
-        why = (
-            _UNKNOWN_ROBOT[robot.limited]
-            if robot.limited or world.bounded
-            else "the world is not known"
-        )
-        found["collisions"] = why
-        if not robot.limited:
-            found["bounds"] = why
+        if robot.limited:
+            return found | {"collisions": "the robot's shape is not known"}
+        why = "the robot is not known" if world.bounded else "the world is not known"
+        found |= {"collisions": why, "bounds": why}
     return found
 
 

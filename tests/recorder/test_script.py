@@ -335,7 +335,7 @@ def test_compiled_scripts_announce_their_classes() -> None:
 def test_modules_call_back_when_they_are_imported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Once each, whoever else waits for them; at once if they are there; never after the end."""
+    """Each import calls back once, that of a loaded module at once, and none after the end."""
     monkeypatch.syspath_prepend(tmp_path)
     for name in ("late_one", "late_two"):
         (tmp_path / f"{name}.py").write_text("class A: pass\nfrom math import pi\n")
